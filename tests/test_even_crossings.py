@@ -123,7 +123,7 @@ def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
 def test_ways_are_the_shortest_legs_of_their_parity(seed):
     graph = travel_graph(small(seed, tether_length=150.0))
     ways = graph.parity_oracle(lambda: False)
-    odd, cluster = odd_numbers(graph.labels, ways.obstacles), graph.cluster
+    odd, cluster = odd_numbers(graph.labels, ways.barriers), graph.cluster
     best = {}
     for u, v in itertools.combinations(range(len(graph)), 2):
         a, b = sorted((int(cluster[u]), int(cluster[v])))
@@ -211,7 +211,7 @@ def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
     )  # fmt: skip
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     found = refine_covers(tower, stops, best.length, Limits())
-    assert found.cells.obstacles == (0,)
+    assert found.cells.barriers == (0,)
     assert found.bound == pytest.approx(best.length, rel=1e-5)
 
 

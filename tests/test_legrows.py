@@ -192,7 +192,7 @@ def over_ways(seed, coarse_covers=3):
     graph = travel_graph(small(seed, tether_length=150.0))
     best = solve_graph(graph, "auto")
     ways = graph.parity_oracle(lambda: False)
-    odd = odd_numbers(graph.labels, ways.obstacles)
+    odd = odd_numbers(graph.labels, ways.barriers)
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     seen = []
 
@@ -379,9 +379,9 @@ def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind):
         assert (seen[slice(None) if asked is None else asked] == 1).all()
     ways = graph.parity_oracle(lambda: False)
     assert graph.parity_oracle is not None
-    odd = odd_numbers(graph.labels, ways.obstacles)
+    odd = odd_numbers(graph.labels, ways.barriers)
     tower = PathCovers(ways, np.inf)
-    cells = tower.cells(tuple(range(ways.obstacles)))
+    cells = tower.cells(tuple(range(ways.barriers)))
     own = cells.cells_of(graph.cluster, odd)
     assert (own >= 0).all()
     least = tower.costs(cells)[own][:, own]

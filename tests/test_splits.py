@@ -83,11 +83,11 @@ def test_legs_by_parity_are_those_between_sides_of_the_cover_above(seed):
         ])  # fmt: skip
         found = tower.costs_by_parity(cells, ends)
         np.testing.assert_array_equal(
-            found.min(axis=2), np.repeat(tower.costs(cells)[*ends.T], tower.obstacles).reshape(
+            found.min(axis=2), np.repeat(tower.costs(cells)[*ends.T], tower.barriers).reshape(
                 len(ends), -1
             )
         )  # fmt: skip
-        for i in range(1, tower.obstacles):
+        for i in range(1, tower.barriers):
             split = tower.cells((0, i))
             costs, own = tower.costs(split), split.cells_below(cells)
             least = np.full((m, m, 2), np.inf)
@@ -100,16 +100,16 @@ def test_legs_by_parity_are_those_between_sides_of_the_cover_above(seed):
                 np.testing.assert_array_equal(found[:, i], least[*ends.T])
 
 
-class TwoObstacles:
+class TwoBarriers:
     """A ring of three goals around the second obstacle, that the first is no part of; both have
     two sides for each goal, and a third, that no leg crosses, has too."""
 
-    obstacles = 3
+    barriers = 3
 
-    def cells(self, obstacles):
-        goals = np.repeat(np.arange(1, 4), 1 << len(obstacles))
-        codes = np.tile(np.arange(1 << len(obstacles)), 3)
-        return Cells(obstacles, np.insert(goals, 0, 0), np.insert(codes, 0, 0))
+    def cells(self, barriers):
+        goals = np.repeat(np.arange(1, 4), 1 << len(barriers))
+        codes = np.tile(np.arange(1 << len(barriers)), 3)
+        return Cells(barriers, np.insert(goals, 0, 0), np.insert(codes, 0, 0))
 
     def costs_by_parity(self, cells, ends):
         out = np.empty((len(ends), 3, 2))
@@ -119,15 +119,15 @@ class TwoObstacles:
 
 
 def test_the_obstacle_that_a_point_goes_around_is_told_apart_first():
-    tower = TwoObstacles()
+    tower = TwoBarriers()
     ring = np.array([(1, 2), (2, 3), (1, 3)])
     splits = CoverRefinement(tower, CoverPolicy(max_cells=100))
-    assert splits.next_obstacles(tower.cells(()), ring, np.ones(3), gap=10.0) == [1]
+    assert splits.next_barriers(tower.cells(()), ring, np.ones(3), gap=10.0) == [1]
     # with no more cells than there may be
     few_cells = CoverRefinement(tower, CoverPolicy(max_cells=6))
-    assert few_cells.next_obstacles(tower.cells(()), ring, np.ones(3), gap=10.0) == []
+    assert few_cells.next_barriers(tower.cells(()), ring, np.ones(3), gap=10.0) == []
     # what promised once is believed after a point that goes around nothing
-    assert splits.next_obstacles(tower.cells((0,)), ring[:2], np.ones(2), gap=10.0) == [1]
+    assert splits.next_barriers(tower.cells((0,)), ring[:2], np.ones(2), gap=10.0) == [1]
 
 
 @pytest.mark.parametrize("much", [True, False])

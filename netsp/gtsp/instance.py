@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from netsp.gtsp.travel.result import OnProgress, Result
 
 Label = tuple[int, ...]
-"""Signed numbers that tell where a vertex lies. Vertices whose labels begin alike lie together; the
-numbers that a label holds an odd number of times say on which sides a vertex lies."""
+"""Numbers of the barriers that a path to a vertex crosses, negative in the other direction.
+
+Vertices whose labels begin alike lie together. A barrier that a label holds an odd number of times
+separates its vertex from the base."""
 
 DistanceOracle = Callable[[Callable[[], bool]], Floats]
 """Function that returns lower bounds (n + 1, n + 1) on the legs between clusters, which also hold

@@ -18,15 +18,15 @@ class Cells:
 
     Attributes
     ----------
-    obstacles
-        Obstacles whose letters count.
+    barriers
+        Barriers that count.
     cluster
         (m,) goal of each cell.
     code
-        (m,) bits, one for each of the obstacles: whether words have an odd number of its letters.
+        (m,) bits, one for each of the barriers: whether labels hold an odd number of it.
     """
 
-    obstacles: tuple[int, ...]
+    barriers: tuple[int, ...]
     cluster: Ints
     code: Ints
 
@@ -38,14 +38,14 @@ class Cells:
         odd
             Result of `netsp.mip.parity_cuts.odd_numbers`.
         """
-        return self._places(cluster, packed(odd, self.obstacles))
+        return self._places(cluster, packed(odd, self.barriers))
 
     def cells_below(self, below: Cells) -> Ints:
         """Return the cell (m,) of a lower cover that each cell lies above.
 
-        The obstacles of the lower cover are the first of this one's.
+        The barriers of the lower cover are the first of this one's.
         """
-        return below._places(self.cluster, self.code & ((1 << len(below.obstacles)) - 1))
+        return below._places(self.cluster, self.code & ((1 << len(below.barriers)) - 1))
 
     def _places(self, cluster: Ints, code: Ints) -> Ints:
         """Return the number of each cell, -1 for none."""
@@ -111,10 +111,10 @@ class GoalBound:
     cells: CellBound | None = None
 
 
-def packed(odd: Bools, obstacles: Sequence[int]) -> Ints:
-    """Return the columns of obstacles in a mask (V, n) as bits (V,)."""
+def packed(odd: Bools, barriers: Sequence[int]) -> Ints:
+    """Return the columns of barriers in a mask (V, n) as bits (V,)."""
     out = np.zeros(len(odd), dtype=np.int64)
-    for j, i in enumerate(obstacles):
+    for j, i in enumerate(barriers):
         if i < odd.shape[1]:
             out |= odd[:, i].astype(np.int64) << j
     return out

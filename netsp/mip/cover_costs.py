@@ -20,12 +20,12 @@ from netsp.mip.cover_bounds import Cells, packed
 
 
 class Covers(Protocol):
-    """Covers of a problem, one for each set of obstacles."""
+    """Covers of a problem, one for each set of barriers."""
 
-    obstacles: int
+    barriers: int
 
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """Return the cells that a tether reaches in the cover of some obstacles."""
+    def cells(self, barriers: tuple[int, ...]) -> Cells:
+        """Return the cells that are reached in the cover of some barriers."""
 
     def costs(self, cells: Cells) -> Floats:
         """Return the costs (m, m) between cells, inf within a goal."""
@@ -33,8 +33,8 @@ class Covers(Protocol):
     def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """Return the costs (k, n, 2) of the cheapest legs between two cells (k, 2), by parity.
 
-        They are those of the legs that write an even, and an odd, number of letters of each
-        obstacle. A cost is inf, or any lower bound on it, if there is no such leg.
+        They are those of the legs that cross an even, and an odd, number of times each
+        barrier. A cost is inf, or any lower bound on it, if there is no such leg.
         """
 
 
@@ -58,13 +58,13 @@ class ClassCovers:
             if isinstance(costs, SparseCosts)
             else np.ones(len(cluster), dtype=bool)
         )
-        self.obstacles = odd.shape[1]
+        self.barriers = odd.shape[1]
 
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """Return the cells of the cover of some obstacles."""
-        both = np.column_stack([self._cluster, packed(self._odd, obstacles)])
+    def cells(self, barriers: tuple[int, ...]) -> Cells:
+        """Return the cells of the cover of some barriers."""
+        both = np.column_stack([self._cluster, packed(self._odd, barriers)])
         both = np.unique(both[self._with_legs], axis=0)
-        return Cells(obstacles, *np.ascontiguousarray(both.T))
+        return Cells(barriers, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
         """Return the costs (m, m) between cells."""
@@ -163,7 +163,7 @@ class PathCovers:
     """
 
     def __init__(self, paths: ParityDistances, max_length: float) -> None:
-        self._paths, self.obstacles = paths, paths.obstacles
+        self._paths, self.barriers = paths, paths.barriers
         self._odd = paths.odd_of(np.arange(len(paths.ends)))
         reached = (paths.ends[:, 0] == 0) & (paths.length <= max_length)
         self._goal, self._at_goal = paths.ends[reached, 1], self._odd[reached]
@@ -173,15 +173,15 @@ class PathCovers:
         pairs = np.arange(self._size**2 + 1)
         self._row = np.searchsorted(self._pair[self._order], pairs).astype(np.int64)
 
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """Return the cells of the cover of some obstacles."""
-        both = np.column_stack([self._goal, packed(self._at_goal, obstacles)])
+    def cells(self, barriers: tuple[int, ...]) -> Cells:
+        """Return the cells of the cover of some barriers."""
+        both = np.column_stack([self._goal, packed(self._at_goal, barriers)])
         both = np.unique(np.vstack([[[0, 0]], both]), axis=0)
-        return Cells(obstacles, *np.ascontiguousarray(both.T))
+        return Cells(barriers, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
         """Return the costs (m, m) between cells."""
-        code, paths = packed(self._odd, cells.obstacles), self._paths
+        code, paths = packed(self._odd, cells.barriers), self._paths
         order = np.lexsort((paths.length, code, self._pair))
         pair, code = self._pair[order], code[order]
         new = np.ones(len(order), dtype=bool)
@@ -199,7 +199,7 @@ class PathCovers:
         low = np.minimum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         high = np.maximum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         wanted = cells.code[ends[:, 0]] ^ cells.code[ends[:, 1]]
-        code = packed(self._odd, cells.obstacles)
+        code = packed(self._odd, cells.barriers)
         pair, rows = low * self._size + high, self._row
         table = PathTable(rows, code, self._paths.length, self._paths.reach)
         return _shortest_by_parity(pair, wanted, table, self._order, self._odd)

@@ -1,13 +1,14 @@
-"""Refinement of covers: the choice of the obstacles whose letters count next.
+"""Refinement of covers: the choice of the barriers that count next.
 
-A leg of a program's point is the shortest between two cells, whichever letters of an obstacle it
-writes. Once these letters count, each cell that is reached on both sides of the obstacle splits in
-two: a leg that writes an even number of them stays on its side, and a leg that writes an odd number
-changes it. With the same legs, and each cell on its better side, the point then costs more by what
-it saved going around that obstacle: the frustration of a signed graph (Harary 1959) with lengths
-for weights. That is the promise of the obstacle. The program may choose other legs and gain less,
-but large promises mean large gains. Minimum frustration is NP-hard; a spanning tree of the legs
-whose sides differ most, and then changing the sides of single cells, comes near it.
+A leg of a program's point is the shortest between two cells, however often it crosses a barrier.
+Once the barrier counts, each cell that is reached on both sides of it splits in two: a leg that
+crosses it an even number of times stays on its side, and a leg that crosses it an odd number of
+times changes it. With the same legs, and each cell on its better side, the point then costs more by
+what it saved by crossing the barrier an odd number of times: the frustration of a signed graph
+(Harary 1959) with lengths for weights. That is the promise of the barrier. The program may choose
+other legs and gain less, but large promises mean large gains. Minimum frustration is NP-hard; a
+spanning tree of the legs whose sides differ most, and then changing the sides of single cells,
+comes near it.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ SIDE_TOLERANCE = 1e-12
 
 @dataclass
 class CoverRefinement:
-    """Choice of obstacles, cover by cover.
+    """Choice of barriers, cover by cover.
 
     Attributes
     ----------
@@ -44,7 +45,7 @@ class CoverRefinement:
     policy: CoverPolicy = CoverPolicy()
     _promised: dict[int, float] = field(default_factory=dict)
 
-    def next_obstacles(
+    def next_barriers(
         self,
         cells: Cells,
         ends: Ints,
@@ -52,7 +53,7 @@ class CoverRefinement:
         gap: float,
         check: Callable[[], None] = lambda: None,
     ) -> list[int]:
-        """Return the obstacles that the next cover adds, those of largest promise per new cell.
+        """Return the barriers that the next cover adds, those of largest promise per new cell.
 
         Parameters
         ----------
@@ -63,11 +64,11 @@ class CoverRefinement:
         gap
             Gap of the bound; a leg that is longer by that much is in no better tour.
         check
-            Called for each obstacle; may raise to stop.
+            Called for each barrier; may raise to stop.
         """
-        policy, known = self.policy, cells.obstacles
-        left = [i for i in range(self.covers.obstacles) if i not in known]
-        if not left or len(known) >= policy.max_obstacles:
+        policy, known = self.policy, cells.barriers
+        left = [i for i in range(self.covers.barriers) if i not in known]
+        if not left or len(known) >= policy.max_barriers:
             return []
         lengths = self.covers.costs_by_parity(cells, ends)
         least = lengths.min(axis=2, keepdims=True)
@@ -86,16 +87,16 @@ class CoverRefinement:
         promising.sort(
             key=lambda i: -self._promised[i] / max(new_cells[i], 1) ** policy.size_exponent
         )
-        # without a promise, prefer obstacles that split few cells
+        # without a promise, prefer barriers that split few cells
         return self._first(cells, promising or sorted(left, key=lambda i: new_cells[i]))
 
     def _first(self, cells: Cells, order: list[int]) -> list[int]:
-        """Return the first obstacles of a list, as many as the limits on cells allow."""
+        """Return the first barriers of a list, as many as the limits on cells allow."""
         policy = self.policy
         out: list[int] = []
         for i in order:
-            count = len(self.covers.cells((*cells.obstacles, *out, i)).cluster)
-            has_all = len(cells.obstacles) + len(out) == policy.max_obstacles
+            count = len(self.covers.cells((*cells.barriers, *out, i)).cluster)
+            has_all = len(cells.barriers) + len(out) == policy.max_barriers
             if (
                 has_all
                 or count > policy.max_cells
@@ -107,9 +108,9 @@ class CoverRefinement:
 
 
 def _sides(cells: Cells, split: Cells) -> Bools:
-    """Return the mask (m, 2) of cells with an even, and an odd, side of the last obstacle above."""
+    """Return the mask (m, 2) of cells with an even, and an odd, side of the last barrier above."""
     out = np.zeros((len(cells.cluster), 2), dtype=bool)
-    out[split.cells_below(cells), split.code >> len(cells.obstacles) & 1] = True
+    out[split.cells_below(cells), split.code >> len(cells.barriers) & 1] = True
     return out
 
 

@@ -1,17 +1,18 @@
 """Lower bounds from covers of more and more sheets.
 
-Over goals alone a tour may go around obstacles. Over all classes there are so many that the
+A barrier is a number in the labels of vertices (`netsp.mip.parity_cuts`). Over goals alone a tour
+may cross barriers an odd number of times. Over all classes there are so many that the
 relaxation falls to the bound over goals before it rises. Between the two are covers of finitely
-many sheets: a *cell* is a goal and, for each of some obstacles, whether the tether's word has an
-odd number of its letters. With no obstacle the cells are the goals; with all of them they are still
+many sheets: a *cell* is a goal and, for each of some barriers, whether labels hold an odd number
+of it. With no barrier the cells are the goals; with all of them they are still
 far fewer than the classes. A leg between two cells costs no more than any leg between their classes
 (`netsp.mip.cover_costs`), so every tour over classes is one over cells, no longer, and bounds over
 cells hold for it.
 
-From one cover to the next, cells split by one more obstacle or two. A cut holds for any set of
+From one cover to the next, cells split by one more barrier or two. A cut holds for any set of
 vertices, so it holds for the vertices above it; the legs above a leg that is in no better tour are
 in none either. So the program continues from its last state, its bound does not fall, and most of
-the larger matrix is fixed out before it is examined. The order of the obstacles makes all the
+the larger matrix is fixed out before it is examined. The order of the barriers makes all the
 difference (`netsp.mip.cover_refinement`).
 """
 
@@ -43,7 +44,7 @@ from netsp.mip.root import Root, tour_legs
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 
 ParityTour = Sequence[tuple[int, Bools]]
-"""Tour as goals, each with the mask of obstacles of which its word has an odd number of letters."""
+"""Tour as goals, each with the mask of barriers of which its label holds an odd number."""
 
 OnCover = Callable[[float, Cells, Ints], tuple[ParityTour, float] | None]
 """Callback after each cover, with the bound, the cells, and the cells that the LP's point visits.
@@ -120,10 +121,10 @@ class _Series:
     def steps(self, tour: ParityTour, length: float, clock: Clock) -> Steps[None]:
         """Solve cover after cover, until the tour is proven or no cover is left."""
         refinement = CoverRefinement(self.covers, self.policy.covers)
-        obstacles: list[int] = []
+        barriers: list[int] = []
         level: _Level | None = None
         for count in itertools.count(1):
-            cells = self.covers.cells(tuple(obstacles))
+            cells = self.covers.cells(tuple(barriers))
             costs = self.covers.costs(cells)
             level = _Level(cells, costs, tour, length, self.limits, level, self.policy)
             proven = yield from level.steps()
@@ -138,13 +139,13 @@ class _Series:
                 return
             is_due = count == self.policy.covers.coarse_covers
             if self.refine_costs is not None and self.found is not None and is_due:
-                # over the same obstacles first, because cells have changed
+                # over the same barriers first, because cells have changed
                 self.covers = refinement.covers = self.refine_costs(self.found, length)
                 continue
-            more = refinement.next_obstacles(level.cells, *level.used_legs(), gap, level.run.check)
+            more = refinement.next_barriers(level.cells, *level.used_legs(), gap, level.run.check)
             if not more:
                 return
-            obstacles += more
+            barriers += more
 
 
 class _Level:
@@ -272,8 +273,8 @@ def _spread(flags: Bools, at: Ints, size: int) -> Bools:
 
 
 def _labels(cells: Cells) -> list[Label]:
-    """Return a label for each cell: the obstacles on whose odd side it is."""
+    """Return a label for each cell: the barriers on whose odd side it is."""
     return [
-        tuple(i + 1 for j, i in enumerate(cells.obstacles) if code >> j & 1)
+        tuple(i + 1 for j, i in enumerate(cells.barriers) if code >> j & 1)
         for code in cells.code.tolist()
     ]

@@ -185,7 +185,7 @@ class _CoverRun:
         paths = graph.parity_oracle and graph.parity_oracle(lambda: share.is_up)
         if paths is None:
             return None
-        self.odd = odd_numbers(graph.labels, paths.obstacles)
+        self.odd = odd_numbers(graph.labels, paths.barriers)
         return PathCovers(paths, np.inf)
 
     def _parity_tour(self) -> ParityTour:

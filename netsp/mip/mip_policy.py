@@ -44,9 +44,9 @@ class CutPolicy:
     max_parity_cuts
         Maximum number of parity cuts per point.
     max_cuts_before_pairs
-        Pairs of obstacles are searched only if single obstacles gave fewer parity cuts than this.
-    max_obstacle_sets
-        Maximum number of obstacles, or of pairs, that are searched for parity cuts.
+        Pairs of barriers are searched only if single barriers gave fewer parity cuts than this.
+    max_barrier_sets
+        Maximum number of barriers, or of pairs, that are searched for parity cuts.
     max_parity_passes
         Maximum number of passes over all clusters when sides of a parity cut are improved.
     incumbent_weight
@@ -72,7 +72,7 @@ class CutPolicy:
     min_parity_violation: float = 0.02
     max_parity_cuts: int = 40
     max_cuts_before_pairs: int = 4
-    max_obstacle_sets: int = 500
+    max_barrier_sets: int = 500
     max_parity_passes: int = 4
     incumbent_weight: float = 0.6
     max_idle_rounds: int = 8
@@ -267,32 +267,32 @@ class BranchingPolicy:
 
 @dataclass(frozen=True)
 class CoverPolicy:
-    """Covers between the goals and all classes: how many, how large, over which obstacles.
+    """Covers between the goals and all classes: how many, how large, over which barriers.
 
     Attributes
     ----------
     min_classes
         Number of classes above which covers are worth their time.
     max_growth
-        Maximum ratio of the cells of a cover to those of the one below, unless one obstacle alone
+        Maximum ratio of the cells of a cover to those of the one below, unless one barrier alone
         adds more.
     coarse_covers
         Covers over shortest paths before those over the classes that are left.
     max_cells
         Maximum number of cells.
-    max_obstacles
-        Maximum number of obstacles by whose sides cells differ; the parities of 62 or fewer fit
+    max_barriers
+        Maximum number of barriers by whose sides cells differ; the parities of 62 or fewer fit
         into the bits of an integer.
     patience
         Pricing passes without progress after which the next cover is tried.
     promise_decay
-        Factor on what an obstacle promised at the cover below: a point goes around it differently
+        Factor on what a barrier promised at the cover below: a point goes around it differently
         in every cover.
     size_exponent
         Promises are divided by the number of new cells to this power: an LP over twice the cells
         takes far more than twice as long.
     min_promise
-        Minimum promise of an obstacle, as a share of the gap.
+        Minimum promise of a barrier, as a share of the gap.
     max_side_passes
         Maximum number of passes over all cells when their sides are improved.
     path_time_share
@@ -305,7 +305,7 @@ class CoverPolicy:
     max_growth: float = 1.3
     coarse_covers: int = 3
     max_cells: int = 6000
-    max_obstacles: int = 60
+    max_barriers: int = 60
     patience: int = 4
     promise_decay: float = 0.5
     size_exponent: float = 2.5
@@ -317,8 +317,8 @@ class CoverPolicy:
     def __post_init__(self) -> None:
         check_not_negative(self)
         check_shares(self, "promise_decay", "path_time_share")
-        if self.max_obstacles > 62:
-            raise InputError(f"max_obstacles: expected at most 62, got {self.max_obstacles}")
+        if self.max_barriers > 62:
+            raise InputError(f"max_barriers: expected at most 62, got {self.max_barriers}")
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
-"""Parity cuts: a free tour crosses the ray of every obstacle an even number of times.
+"""Parity cuts: a tour crosses every barrier an even number of times.
 
-The word of a tour that is not entangled is empty, so an even number of its legs write an odd number
-of letters of an obstacle. On the cover these are the legs that leave the set H of vertices whose
-words hold an odd number of that letter. An LP that visits halves of vertices can go around an
-obstacle once at no cost, because it returns on another sheet. As in generalised 2-matching
+A barrier is a number in the labels of vertices, in the plane the ray of an obstacle. A leg crosses
+it if one of its ends is in the set H of vertices whose labels hold the number an odd number of
+times, and the other is not. An LP that visits halves of vertices can cross a barrier once at no
+cost, because it returns through other vertices of the same clusters. As in generalised 2-matching
 inequalities (`netsp.mip.blossoms`), for an odd number k of teeth, pairs of clusters,
 
     y(δ(H)) - 2 Σ y(legs of a tooth in δ(H)) >= 1 - k,
@@ -11,8 +11,8 @@ inequalities (`netsp.mip.blossoms`), for an odd number k of teeth, pairs of clus
 because a tour has at most one leg between two clusters, and a tour with all k of these and no other
 leg in δ(H) would cross it an odd number of times. If H is a union of clusters, these are 2-matching
 inequalities; together they are the {0, 1/2}-cuts (Caprara & Fischetti 1996) of the equations of
-degree and parity. For a set of obstacles and a set of clusters, H holds the vertices whose letters
-of those obstacles, plus one in those clusters, add up to an odd number.
+degree and parity. For a set of barriers and a set of clusters, H holds the vertices whose labels
+hold those numbers, plus one in those clusters, an odd number of times in all.
 
 Separation chooses the clusters. A pair of clusters with the flow q across H costs min(q, 1 - q),
 and is a tooth if q is more than a half; if the number of teeth is even, one pair is changed. A cut
@@ -72,7 +72,7 @@ def parity_cuts(
     odd
         Result of `odd_numbers`.
     check
-        Called for each set of obstacles; may raise to stop.
+        Called for each set of barriers; may raise to stop.
     """
     on = y > FLOW_TOLERANCE
     u, v = legs[on].T
@@ -83,11 +83,11 @@ def parity_cuts(
     for size in (1, 2):
         if len(found) >= policy.max_cuts_before_pairs:
             break
-        if math.comb(odd.shape[1], size) > policy.max_obstacle_sets:
+        if math.comb(odd.shape[1], size) > policy.max_barrier_sets:
             break
-        for obstacles in combinations(range(odd.shape[1]), size):
+        for barriers in combinations(range(odd.shape[1]), size):
             check()
-            side_of = _sides(odd, obstacles)
+            side_of = _sides(odd, barriers)
             flow = _flow(pair, side_of[u] ^ side_of[v], y[on], len(pairs))
             if not flow[:, 1].any():
                 continue
@@ -110,14 +110,15 @@ def _pairs_of(ends: Ints, size: int) -> tuple[Ints, Ints]:
 
 
 def _flow(pair: Ints, odd: Bools, y: Floats, pairs: int) -> Floats:
-    """Return y of each pair's legs (p, 2) that write an even, and an odd, number of letters."""
+    """Return y of each pair's legs (p, 2) that cross barriers an even, and an odd, number of
+    times."""
     out = np.zeros((pairs, 2))
     np.add.at(out, (pair, odd.astype(np.int64)), y)
     return out
 
 
-def _sides(odd: Bools, obstacles: tuple[int, ...]) -> Bools:
-    return np.asarray(np.logical_xor.reduce(odd[:, list(obstacles)], axis=1))
+def _sides(odd: Bools, barriers: tuple[int, ...]) -> Bools:
+    return np.asarray(np.logical_xor.reduce(odd[:, list(barriers)], axis=1))
 
 
 def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
@@ -132,7 +133,7 @@ def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
             break
         a, b = at[p]
         if root[a] != root[b]:
-            # the pair does not cross if its sides differ exactly where its legs write letters
+            # the pair does not cross if its sides differ exactly where its legs cross
             is_crossing = bool(turned[a] ^ turned[b]) != bool(label)
             moved = root == root[b]
             turned[moved] ^= is_crossing

@@ -1,9 +1,9 @@
 """Separation of subtour cuts.
 
 At integer points they are the components of the support. At fractional points they are found by
-components, too, by minimum cuts among clusters, by branches of the cover (for every prefix of a
-word, the vertices whose word begins with it, which lie together in space), and by minimum cuts
-among vertices, which find a violated cut of a cluster if there is one.
+components, too, by minimum cuts among clusters, by families of labels (for every prefix of a label,
+the vertices whose label begins with it, which lie together), and by minimum cuts among vertices,
+which find a violated cut of a cluster if there is one.
 """
 
 from __future__ import annotations

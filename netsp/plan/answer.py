@@ -11,10 +11,11 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.base.errors import warn_left_out
-from netsp.gtsp.travel.result import Result, Trajectory
+from netsp.gtsp.travel.result import Result
 from netsp.hsignature import Word, entangled
 from netsp.model.problem import Problem
 from netsp.model.solution import ProblemReference, Solution, Timings, Visit
+from netsp.roadmap.tether_blind_legs import BlindTrajectory
 from netsp.roadmap.travel_graph import TravelGraph
 
 
@@ -27,7 +28,7 @@ def to_solution(
     timings: Timings | None = None,
 ) -> Solution:
     """Write a solver's result as a solution of the problem, its path drawn."""
-    if result.trajectory is not None:
+    if isinstance(result.trajectory, BlindTrajectory):
         visits, path = _blind_visits(problem, result.trajectory), result.trajectory.path
         wrapped = tuple(k - 1 for k in entangled(result.trajectory.word))
     else:
@@ -75,7 +76,7 @@ def _visit(problem: Problem, goal: int, word: Word, tether: float) -> Visit:
     )
 
 
-def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
+def _blind_visits(problem: Problem, walked: BlindTrajectory) -> tuple[Visit, ...]:
     """Return the visits of a blind baseline, with the taut tether that its path would need.
 
     Where that is not found, the length of the path up to the visit stands in its place, with a

@@ -13,9 +13,10 @@ import numpy as np
 
 from netsp.gtsp.limits import Limits
 from netsp.gtsp.solver_run import SolverRun
-from netsp.gtsp.travel.result import Result, Trajectory
+from netsp.gtsp.travel.result import Result
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.model.solution import Status
+from netsp.roadmap.tether_blind_legs import BlindTrajectory
 from netsp.roadmap.travel_graph import TravelGraph
 
 
@@ -37,7 +38,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     """
     limits = limits or Limits()
     run = SolverRun(graph, limits)
-    trajectory: Trajectory | None = None
+    trajectory: BlindTrajectory | None = None
     with run.until_stopped(blind=True):
         if not run.solve_if_trivial():
             run.check()
@@ -49,7 +50,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     return Result(None, length, None, Status.INVALID, trace, trajectory=trajectory)
 
 
-def _nearest_neighbour(graph: TravelGraph, run: SolverRun) -> Trajectory | None:
+def _nearest_neighbour(graph: TravelGraph, run: SolverRun) -> BlindTrajectory | None:
     """Return the trajectory, or None if it is a tour of the graph and so the incumbent."""
     detours = graph.detours(sub_goals=False, check=run.check)
     order, at = [], 0
@@ -71,4 +72,4 @@ def _nearest_neighbour(graph: TravelGraph, run: SolverRun) -> Trajectory | None:
     legs = [detours.path(a, b) for a, b in pairwise(visits)]
     path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
     length = sum(detours.length(a, b) for a, b in pairwise(visits))
-    return Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path, length)
+    return BlindTrajectory(tuple(order), path, length, tuple(words[1:-1]), words[-1])

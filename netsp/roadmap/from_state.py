@@ -26,7 +26,7 @@ from netsp.base.errors import InputError, NetspError
 from netsp.gtsp.cost_oracle import Estimate
 from netsp.gtsp.instance import ParityOracle
 from netsp.gtsp.travel.costs import rounded_down
-from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, ParityDistances
+from netsp.gtsp.travel.parity_distances import BITS_PER_ENTRY, ParityDistances
 from netsp.gtsp.travel.result import OnProgress, Progress, Result
 from netsp.hsignature import reduce
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
@@ -111,7 +111,7 @@ class GraphFromState(TravelGraph):
         rest = ~(base & start)
         odd = np.zeros((1, paths.odd.shape[1]), dtype=np.uint64)
         for a in self.signatures[self.start]:
-            odd[0, (abs(a) - 1) // BITS_PER_WORD] ^= np.uint64(1 << (abs(a) - 1) % BITS_PER_WORD)
+            odd[0, (abs(a) - 1) // BITS_PER_ENTRY] ^= np.uint64(1 << (abs(a) - 1) % BITS_PER_ENTRY)
         return dataclasses.replace(
             paths,
             ends=np.vstack([paths.ends[rest], [[0, goal]]]),

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Floats, Ints
 from netsp.base.compiled.kernel import kernel
-from netsp.gtsp.travel.parity_distances import BITS_PER_WORD, ParityDistances
+from netsp.gtsp.travel.parity_distances import BITS_PER_ENTRY, ParityDistances
 from netsp.roadmap.explore import ALL, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.trie import LETTER, PARENT, Trie
@@ -70,7 +70,7 @@ def _paths_up_to(
 def _paths_from(paths: TautPaths, a: int, reach: float) -> tuple[ParityRows, int] | None:
     """Return the paths from a goal to those of higher numbers, and the number of taut paths; None
     if there are too many."""
-    words = max(1, -(-len(paths.outline.rays) // BITS_PER_WORD))
+    words = max(1, -(-len(paths.outline.rays) // BITS_PER_ENTRY))
     trie = Trie.root(reach)
     found = run_explore(
         paths.tangents,
@@ -101,5 +101,5 @@ def _odd_letters(trie: Ints, size: int, words: int) -> npt.NDArray[np.uint64]:
         for j in range(words):
             out[k, j] = out[trie[k, PARENT], j]
         i = abs(trie[k, LETTER]) - 1
-        out[k, i // BITS_PER_WORD] ^= np.uint64(1) << np.uint64(i % BITS_PER_WORD)
+        out[k, i // BITS_PER_ENTRY] ^= np.uint64(1) << np.uint64(i % BITS_PER_ENTRY)
     return out

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.base.arrays import Floats, Ints
+from netsp.gtsp.travel.result import Trajectory
 from netsp.hsignature import Word, concatenate, invert
 
 DIRECT = -1
@@ -80,3 +81,19 @@ class Detours:
 
     def _word(self, a: int, p: int) -> Word:
         return tuple(int(x) for x in self.letters[self.row[a, p] : self.row[a, p + 1]])
+
+
+@dataclass(frozen=True, eq=False)
+class BlindTrajectory(Trajectory):
+    """Closed path of a baseline that ignores the tether, whatever it entangles.
+
+    Parameters
+    ----------
+    words : tuple of Word
+        At each goal, the word of the path from the base.
+    word : Word
+        Word of the whole path.
+    """
+
+    words: tuple[Word, ...]
+    word: Word

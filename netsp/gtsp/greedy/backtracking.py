@@ -65,11 +65,12 @@ def solve(graph: Instance, params: Params | None = None, limits: Limits | None =
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         if not run.solve_if_trivial():
-            stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.can_retrace)
+            retrace = chosen.retrace == "path" and graph.can_retrace
+            stage = _nearest_neighbour_tour(run, retrace=retrace)
     return run.finish(stage)
 
 
-def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
+def _nearest_neighbour_tour(run: SolverRun, *, retrace: bool) -> str:
     graph = run.graph
     tour = [0]
     left = graph.cluster != 0
@@ -155,7 +156,7 @@ def solve_2016(
             if chosen.retrace == "goal":
                 _out_and_back(run)
             else:
-                stage = _nearest_by_tether(run, retrace=graph.can_retrace)
+                stage = _nearest_neighbour_tour(run, retrace=graph.can_retrace)
     return run.finish(stage)
 
 

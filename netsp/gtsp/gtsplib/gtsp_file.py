@@ -121,7 +121,7 @@ def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> GtsplibInstance
 
 
 class _Reader:
-    """Reader of one file: values of its keywords, and words of its sections with their lines."""
+    """Reader of one file: values of its keywords, and tokens of its sections with their lines."""
 
     def __init__(self, path: str, text: str, policy: FilePolicy) -> None:
         self.path, self.policy = path, policy
@@ -202,37 +202,37 @@ class _Reader:
 
     def numbers(self, section: str, count: int, what: str) -> list[tuple[int, float]]:
         """Return the numbers of a section, with their lines."""
-        words = self.sections.get(section)
-        if words is None:
+        tokens = self.sections.get(section)
+        if tokens is None:
             raise self.wrong(None, f"{section}: expected {what}, got none")
-        if len(words) != count:
+        if len(tokens) != count:
             raise self.wrong(
-                words[-1][0] if words else None,
-                f"{section}: expected {what}, {count} numbers, got {len(words)}",
+                tokens[-1][0] if tokens else None,
+                f"{section}: expected {what}, {count} numbers, got {len(tokens)}",
             )
-        return [(line, self.number(line, word)) for line, word in words]
+        return [(line, self.number(line, token)) for line, token in tokens]
 
-    def number(self, line: int, word: str) -> float:
+    def number(self, line: int, token: str) -> float:
         try:
-            value = float(word)
+            value = float(token)
         except ValueError:
             value = np.nan
         if not abs(value) <= 1e100:
-            raise self.wrong(line, f"expected a number, got {shown(word)}")
+            raise self.wrong(line, f"expected a number, got {shown(token)}")
         return value
 
-    def vertex(self, line: int, word: str, n: int) -> int:
+    def vertex(self, line: int, token: str, n: int) -> int:
         """Return a vertex, counted from 0; the file counts from 1."""
-        value = self.number(line, word)
+        value = self.number(line, token)
         if value != int(value) or not 1 <= value <= n:
-            raise self.wrong(line, f"expected a vertex from 1 to {n}, got {shown(word)}")
+            raise self.wrong(line, f"expected a vertex from 1 to {n}, got {shown(token)}")
         return int(value) - 1
 
     def places(self, n: int, dimensions: int) -> Floats:
         """Return the coordinates (n, k)."""
         expected = f"a number and {dimensions} coordinates for each of {n} vertices"
-        words = self.numbers("NODE_COORD_SECTION", n * (dimensions + 1), expected)
-        rows = [words[k : k + dimensions + 1] for k in range(0, len(words), dimensions + 1)]
+        tokens = self.numbers("NODE_COORD_SECTION", n * (dimensions + 1), expected)
+        rows = [tokens[k : k + dimensions + 1] for k in range(0, len(tokens), dimensions + 1)]
         out = np.full((n, dimensions), np.nan)
         for (line, number), *coordinates in rows:
             v = self.vertex(line, f"{number:g}", n)
@@ -250,13 +250,13 @@ class _Reader:
             )
         section = "EDGE_WEIGHT_SECTION"
         if form == "FULL_MATRIX":
-            words = self.numbers(section, n * n, f"a row for each of {n} vertices")
-            return np.array([x for _, x in words]).reshape(n, n)
+            tokens = self.numbers(section, n * n, f"a row for each of {n} vertices")
+            return np.array([x for _, x in tokens]).reshape(n, n)
         upper, off = TRIANGLES[form]
         rows, columns = np.triu_indices(n, off) if upper else np.tril_indices(n, -off)
-        words = self.numbers(section, len(rows), f"half a matrix of {n} vertices ({form})")
+        tokens = self.numbers(section, len(rows), f"half a matrix of {n} vertices ({form})")
         out = np.zeros((n, n))
-        out[rows, columns] = out[columns, rows] = [x for _, x in words]
+        out[rows, columns] = out[columns, rows] = [x for _, x in tokens]
         return out
 
     def check_symmetric(self, costs: Floats) -> None:
@@ -273,17 +273,17 @@ class _Reader:
 
     def sets(self, n: int) -> Ints:
         """Return the cluster (n,) of each vertex."""
-        words = self.sections["GTSP_SET_SECTION"]
+        tokens = self.sections["GTSP_SET_SECTION"]
         groups: list[tuple[int, list[tuple[int, str]]]] = []
         open_: list[tuple[int, str]] = []
-        for line, word in words:
-            if word == "-1":
+        for line, token in tokens:
+            if token == "-1":
                 if not open_:
                     raise self.wrong(line, "expected the number of a set before -1")
                 groups.append((open_[0][0], open_))
                 open_ = []
             else:
-                open_.append((line, word))
+                open_.append((line, token))
         if open_:
             raise self.wrong(open_[-1][0], "expected -1 at the end of a set")
         out = np.full(n, -1)
@@ -306,8 +306,8 @@ class _Reader:
         return out
 
     def put(self, out: Ints, cluster: int, members: Sequence[tuple[int, str]]) -> None:
-        for line, word in members:
-            v = self.vertex(line, word, len(out))
+        for line, token in members:
+            v = self.vertex(line, token, len(out))
             if out[v] == cluster:
                 raise self.wrong(line, f"vertex {v + 1} is in set {cluster + 1} twice")
             if out[v] >= 0:

@@ -1,1 +1,1 @@
-"""The seam between geometry and optimisation: travel graphs, the detours beneath, results."""
+"""Data of solvers: given costs, distances by parity, results and their bounds."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from netsp.base.arrays import ComparesArrays, Floats, Ints
 from netsp.base.data_frames import frame_of
-from netsp.hsignature import Word
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope, gap_of
 from netsp.model.solution import Status
 
@@ -102,16 +101,12 @@ def of_part(
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(ComparesArrays):
-    """Closed path of a baseline that ignores the tether, whatever it entangles.
+    """Closed path of a baseline that is no tour of the instance.
 
     Parameters
     ----------
     order : tuple of int
         Goals (clusters) in the order visited.
-    words : tuple of Word
-        At each of them, the word of the path from the base.
-    word : Word
-        Of the whole path.
     path : ndarray, shape (n, 3)
         Closed polyline, circumscribed to arcs.
     length : float
@@ -119,8 +114,6 @@ class Trajectory(ComparesArrays):
     """
 
     order: tuple[int, ...]
-    words: tuple[Word, ...]
-    word: Word
     path: Floats
     length: float
 
@@ -145,7 +138,7 @@ class Result:
         Vertices as they are walked, base to base, where that is longer than the tour because the
         solver retraces its steps; `length` is then that of the walk.
     trajectory : Trajectory, optional
-        Of a blind baseline with status `invalid`; `tour` is then None.
+        Path of a baseline with status `invalid`; `tour` is then None.
     lower_bound_of : Scope
         Tours that the lower bound holds for.
     """
