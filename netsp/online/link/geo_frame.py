@@ -53,16 +53,17 @@ class Frame:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
         self.site, self.is_given = site, kind is not None
-        problem = site if isinstance(site, Problem) else None
-        projection = None if problem is None else Projection.for_problem(problem)
+        self.is_planar = isinstance(site, Problem)
+        if isinstance(site, Problem):
+            projection, origin = Projection.for_problem(site), site.origin
+            self.units, base = site.units, site.base
+        else:
+            projection = origin = None
+            self.units, base = "m", site.start
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
         self.projection = None if kind == "local" else projection
-        self.is_planar, self.units = problem is not None, problem.units if problem else "m"
-        base = site.start if isinstance(site, Mission) else site.base
-        self.base = np.asarray(base, dtype=float)
-        origin = None if problem is None else problem.origin
-        self.has_origin = origin is not None
+        self.base, self.has_origin = np.asarray(base, dtype=float), origin is not None
         heading = math.radians(origin.heading) if origin else 0.0
         self._cos, self._sin = math.cos(heading), math.sin(heading)
 
