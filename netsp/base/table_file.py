@@ -233,21 +233,16 @@ def read_table(
         names = _comment_head(comment, separator)
         if len(names) >= len(rows[0]) or len(names) >= 3:
             head = names
-    columns, unused = meanings(head, source) if head else ({}, ())
-    if not head:
+    if head:
+        columns, unused = meanings(head, source)
+        _check_widths(rows, lines, len(head), separator, source)
+    else:
         columns = _by_position(rows, positional, source, sample_lines)
         unused = tuple(f"column {k + 1}" for k in range(len(positional), max(map(len, rows))))
         if not positional:
             raise InputError(
                 f"{source}: line {lines[0]}: expected the names of the columns first, got "
                 f"{shown(', '.join(rows[0]))}"
-            )
-    for line, cells in zip(lines, rows, strict=True):
-        if head and len(cells) > len(head) and any(c.strip() for c in cells[len(head) :]):
-            hint = "; decimal commas need semicolons between the cells" if separator == "," else ""
-            raise InputError(
-                f"{source}: line {line}: expected {len(head)} cells as the head has, got "
-                f"{len(cells)}{hint}"
             )
     used = [k for q, (k, _) in columns.items() if q not in WITHOUT_UNIT]
     commas = _decimal_commas(rows, lines, used, source, sample_lines)
@@ -346,6 +341,19 @@ def _by_position(
                     "the columns in the first line"
                 )
     return {q: (k, Column(q)) for k, q in enumerate(positional) if k < width}
+
+
+def _check_widths(
+    rows: Sequence[Sequence[str]], lines: Sequence[int], width: int, separator: str, source: str
+) -> None:
+    """Refuse rows with more cells than the head has."""
+    for line, cells in zip(lines, rows, strict=True):
+        if len(cells) > width and any(c.strip() for c in cells[width:]):
+            hint = "; decimal commas need semicolons between the cells" if separator == "," else ""
+            raise InputError(
+                f"{source}: line {line}: expected {width} cells as the head has, got "
+                f"{len(cells)}{hint}"
+            )
 
 
 def _decimal_commas(

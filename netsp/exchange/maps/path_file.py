@@ -16,7 +16,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.columns import Quantity
-from netsp.base.errors import InputError
+from netsp.base.errors import InputError, counted
 from netsp.base.field_types import LARGEST
 from netsp.base.files import read_text
 from netsp.base.polyline_file import read_path
@@ -169,20 +169,13 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
             gaps += 1
             continue
         place = f"{file}: line {number}, point {len(values)}"
-        values.append(
-            [
-                _number(table.plain(k, name), f"{place}: {table.title(name)}")
-                * table.columns[name][1].factor
-                + 0.0
-                for name in quantities
-            ]
-        )
+        values.append(_numbers(table, k, quantities, place))
         if stamps is not None:
             date = table.text(k, "date") if clock == "time" else ""
             where = f"{place}: {table.title(clock)}"
             times.append(stamps.seconds(table.plain(k, clock), where, date))
     if gaps:
-        rows = "1 row" if gaps == 1 else f"{gaps} rows"
+        rows = counted(gaps, "row")
         notes.append(f"{file}: {rows} left out: no position: a gap of the path")
     if len(values) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(values)}")
@@ -192,6 +185,16 @@ def _of_table(file: str | Path, problem: Problem, stem: str, policy: ReadPolicy)
     if is_global:
         _project(points, problem, file)
     return FoundPath(stem, points, np.array(times) if times else None, tuple(notes))
+
+
+def _numbers(table: Table, row: int, quantities: Sequence[Quantity], place: str) -> list[float]:
+    """Return the numbers of a row, in metres or degrees."""
+    return [
+        _number(table.plain(row, name), f"{place}: {table.title(name)}")
+        * table.columns[name][1].factor
+        + 0.0
+        for name in quantities
+    ]
 
 
 def _untitled_table(file: str | Path, stem: str, wanted: str) -> FoundPath:

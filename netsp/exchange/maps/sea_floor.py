@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from netsp.base.arrays import Floats
+from netsp.base.arrays import Bools, Floats
 from netsp.base.errors import InputError
 from netsp.base.files import write_text
 from netsp.base.validated import shown
@@ -151,19 +151,7 @@ def sea_floor(
     spots = np.empty((0, 3)) if soundings is None else soundings
     x: Floats = west + cell * np.arange(0.5, columns)
     y: Floats = south + cell * np.arange(0.5, rows)
-    min_depth = np.full((rows, columns), -np.inf)
-    max_depth = np.full((rows, columns), np.inf)
-    has_area = np.zeros((rows, columns), dtype=bool)
-    for area in areas:
-        inside = _covered(area.shape, x, y)
-        low = area.min_depth if area.min_depth is not None else -np.inf
-        high = area.max_depth if area.max_depth is not None else np.inf
-        max_depth[inside] = np.minimum(max_depth[inside], high)
-        first = inside & ~has_area
-        min_depth[first] = low
-        both = inside & has_area
-        min_depth[both] = np.minimum(min_depth[both], low)
-        has_area |= inside
+    min_depth, max_depth, has_area = _depth_ranges(areas, x, y)
     between, by_shoal = _interpolated(contours, spots, _is_shoal(spots, areas), x, y)
     # beyond all soundings: the least depth
     depth = np.where(np.isfinite(between), between, min_depth)
@@ -179,6 +167,25 @@ def sea_floor(
     if np.isnan(depth).all():
         raise InputError("floor: the chart gives no depth within the tether's reach")
     return SeaFloor(west, south, cell, 0.0 - depth[::-1])
+
+
+def _depth_ranges(areas: Sequence[DepthArea], x: Floats, y: Floats) -> tuple[Floats, Floats, Bools]:
+    """Return the minimum and maximum depth at each cell by the areas around it, and whether there
+    are any."""
+    min_depth = np.full((len(y), len(x)), -np.inf)
+    max_depth = np.full((len(y), len(x)), np.inf)
+    has_area = np.zeros((len(y), len(x)), dtype=bool)
+    for area in areas:
+        inside = _covered(area.shape, x, y)
+        low = area.min_depth if area.min_depth is not None else -np.inf
+        high = area.max_depth if area.max_depth is not None else np.inf
+        max_depth[inside] = np.minimum(max_depth[inside], high)
+        first = inside & ~has_area
+        min_depth[first] = low
+        both = inside & has_area
+        min_depth[both] = np.minimum(min_depth[both], low)
+        has_area |= inside
+    return min_depth, max_depth, has_area
 
 
 def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:

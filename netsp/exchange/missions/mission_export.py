@@ -97,17 +97,8 @@ def export_mission(
     if projection is None and kind != "csv":
         raise InputError(f"origin: format {kind!r} needs latitude and longitude of the start")
     points = _waypoints(mission, projection)
-    if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
-        raise InputError(
-            f"mission: needs {len(points)} waypoints, and the vehicle takes "
-            f"{settings.max_waypoints}; raise that number if yours takes more"
-        )
-    high = max(p.position[2] for p in points)
-    if high > surface and kind in FOR_VEHICLES:
-        raise InputError(
-            f"surface: {surface:g} is below the tour, which rises to z {high:.4g}; expected the z "
-            "of the water's surface"
-        )
+    if kind in FOR_VEHICLES:
+        _check_for_vehicle(points, settings, surface)
     scene = scene or mission.load_scene()
     field = scene.field()
     context = PlanningContext.for_mission(mission, scene, field)
@@ -123,6 +114,21 @@ def export_mission(
     write_page(file, kind, FORMATS[kind](problem, sunk, projection, settings))
     room = float(field.distance(polylines.dense(line, 0.05)).min())
     return Exported(sunk, longest, room)
+
+
+def _check_for_vehicle(points: list[Waypoint], settings: ExportSettings, surface: float) -> None:
+    """Refuse more waypoints than a vehicle takes, and waypoints above the water's surface."""
+    if len(points) > settings.max_waypoints:
+        raise InputError(
+            f"mission: needs {len(points)} waypoints, and the vehicle takes "
+            f"{settings.max_waypoints}; raise that number if yours takes more"
+        )
+    high = max(p.position[2] for p in points)
+    if high > surface:
+        raise InputError(
+            f"surface: {surface:g} is below the tour, which rises to z {high:.4g}; expected the z "
+            "of the water's surface"
+        )
 
 
 def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint]:
