@@ -217,14 +217,9 @@ def refuse(args: argparse.Namespace, names: str, reason: str) -> None:
 
 def files_of(args: argparse.Namespace, kind: type[Option]) -> list[str]:
     """Return the files that were given for options of a kind."""
-    given = [
-        each.value(args) for each in each_option(args.declared.options) if isinstance(each, kind)
-    ]
-    return [
-        file
-        for value in given
-        for file in (value if isinstance(value, list) else [value] if value is not None else [])
-    ]
+    every = [each for each in each_option(args.declared.options) if isinstance(each, kind)]
+    given = [each.value(args) for each in every if each.value(args) is not None]
+    return [file for value in given for file in (value if isinstance(value, list) else [value])]
 
 
 def check_stdout(args: argparse.Namespace) -> None:

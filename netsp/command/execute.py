@@ -17,7 +17,7 @@ from netsp.command.types import load_pair, vector
 if TYPE_CHECKING:
     from netsp.model.problem import Problem
     from netsp.online.execute.events import Surprises
-    from netsp.online.execute.execution_log import ExecutionRow
+    from netsp.online.execute.execution_log import Execution, ExecutionRow
 
 
 def run(args: argparse.Namespace) -> int:
@@ -64,11 +64,9 @@ def _problem(args: argparse.Namespace) -> int:
     from netsp.base.interrupt_signals import until_interrupt
     from netsp.command.flight import exit_code
     from netsp.online.execute.execute_policy import RepairPolicy
-    from netsp.online.execute.execution_files import write_execution
-    from netsp.online.execute.execution_log import ExecutionOptions, describe_execution
+    from netsp.online.execute.execution_log import ExecutionOptions
     from netsp.online.execute.tether_reserve import ReservePolicy
     from netsp.online.execute.tour_execution import execute
-    from netsp.view.pictures.execution import save_execution
 
     if args.solution is None:
         raise InputError(
@@ -94,14 +92,23 @@ def _problem(args: argparse.Namespace) -> int:
     if show:
         print(file=sys.stderr)
     with until_interrupt(None):  # the run is over; only a second Ctrl-C breaks off writing it
-        if args.output is not None:
-            write_execution(done, args.output)
-            save_execution(done, Path(args.output) / "run.png")
-        if args.output is None or args.json:
-            json_output.tell(done.summary)
-        if not args.quiet:
-            print(describe_execution(done), file=sys.stderr)
+        write_result(args, done)
     return exit_code(done.summary, done.summary["home"], done.summary["tether_free"])
+
+
+def write_result(args: argparse.Namespace, done: Execution) -> None:
+    """Write the files of a run, and print its result."""
+    from netsp.online.execute.execution_files import write_execution
+    from netsp.online.execute.execution_log import describe_execution
+    from netsp.view.pictures.execution import save_execution
+
+    if args.output is not None:
+        write_execution(done, args.output)
+        save_execution(done, Path(args.output) / "run.png")
+    if args.output is None or args.json:
+        json_output.tell(done.summary)
+    if not args.quiet:
+        print(describe_execution(done), file=sys.stderr)
 
 
 def checked_surprises(args: argparse.Namespace, problem: Problem) -> Surprises | None:

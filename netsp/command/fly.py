@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.base.errors import InputError
-from netsp.command import json_output
 from netsp.command.clearance_warning import warn_of_problem
 from netsp.command.types import load_verified_pair
 
@@ -135,36 +134,20 @@ def _report_failure(args: argparse.Namespace, done: Execution) -> tuple[Exceptio
     """Write the files of the run and print its result; return an exception that this raised, and
     whether Ctrl-C was pressed meanwhile. The caller stands by the vehicle in either case."""
     from netsp.base.interrupt_signals import deferred_interrupts
+    from netsp.command.execute import write_result
 
     failure = None
     try:
         with deferred_interrupts():
             try:
-                _tell(args, done)
+                write_result(args, done)
+                if not args.quiet and (done.stopped or done.interrupted):
+                    print(way_home(done), file=sys.stderr)
             except Exception as error:
                 failure = error
     except KeyboardInterrupt:
         return failure, True
     return failure, False
-
-
-def _tell(args: argparse.Namespace, done: Execution) -> None:
-    """Write the files of the run, and print its result."""
-    if args.output is not None:
-        from netsp.online.execute.execution_files import write_execution
-        from netsp.view.pictures.execution import save_execution
-
-        write_execution(done, args.output)
-        save_execution(done, Path(args.output) / "run.png")
-    if args.output is None or args.json:
-        json_output.tell(done.summary)
-        sys.stdout.flush()
-    if not args.quiet:
-        from netsp.online.execute.execution_log import describe_execution
-
-        print(describe_execution(done), file=sys.stderr)
-        if done.stopped or done.interrupted:
-            print(way_home(done), file=sys.stderr)
 
 
 def _stand_by(
