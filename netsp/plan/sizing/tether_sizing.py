@@ -20,7 +20,7 @@ import io
 import json
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -282,20 +282,11 @@ def _staircase(
         needs = float(graph.tethers[tour].max())
         # a longer tether never makes the shortest tour longer
         bound = min(max(bound, result.lower_bound or 0.0), result.length)
-        step = Step(
-            needs,
-            limit,
-            result.length,
-            bound,
-            result.status,
-            tuple(int(g) - 1 for g in graph.goal[tour[1:]]),
-        )
+        order = tuple(int(g) - 1 for g in graph.goal[tour[1:]])
+        step = Step(needs, limit, result.length, bound, result.status, order)
         limit = needs
         if curve and step.length <= curve[-1].length * (1.0 + STEP_TOLERANCE):
-            before = curve.pop()
-            step = Step(
-                needs, before.until, before.length, before.lower_bound, before.status, step.order
-            )
+            step = replace(curve.pop(), tether=needs, order=order)
         curve.append(step)
         if on_step is not None:
             on_step(step)

@@ -330,17 +330,7 @@ def compare_paths(
         raise InputError(f"--solution: has no tour (status {solution.status.value})")
     policy = policy or PathPolicy()
     on_stage("measuring paths")
-    laid = _laid_tether(problem)
-    measured = []
-    for path in paths:
-        try:
-            measured.append(
-                measure_path(
-                    problem, path.points, times=path.times, speed=speed, policy=policy, tether=laid
-                )
-            )
-        except InputError as error:
-            raise InputError(f"{path.name}: {error}") from None
+    measured = _measured(problem, paths, speed, policy)
     clock = Clock(time_limit)
     note, is_infeasible = "", False
     if solution is None:
@@ -367,6 +357,23 @@ def compare_paths(
             visited = _visited_length(problem, m.order, time_limit=left(), seed=seed)
         out.append(ComparedPath(path.name, m, *known[m.order], visited))
     return PathComparison(problem, tuple(out), solution, note, speed, is_infeasible)
+
+
+def _measured(
+    problem: Problem, paths: Sequence[FoundPath], speed: float, policy: PathPolicy
+) -> list[PathMeasures]:
+    """Return the measures of paths; an error names its path."""
+    laid, out = _laid_tether(problem), []
+    for path in paths:
+        try:
+            out.append(
+                measure_path(
+                    problem, path.points, times=path.times, speed=speed, policy=policy, tether=laid
+                )
+            )
+        except InputError as error:
+            raise InputError(f"{path.name}: {error}") from None
+    return out
 
 
 def _laid_tether(problem: Problem) -> Floats | None:
