@@ -32,9 +32,8 @@ from netsp.mip.goal_relaxation import CoverCosts, goal_bound_steps
 from netsp.mip.lp_warm_start import WarmStart
 from netsp.mip.merging import merge
 from netsp.mip.mip_solver import MipRun
-from netsp.mip.mip_solver import Params as MipParams
-from netsp.mip.mip_solver import solve as prove
 from netsp.model.bound_scope import LowerBound
+from netsp.model.solution import Status
 from netsp.plan import exact
 from netsp.plan.solve_policy import SolvePolicy
 
@@ -131,7 +130,7 @@ class Portfolio:
             return tasks
         pairs = (graph.goal_count + 1) ** 2
         tasks.append(Task("goals", self._goals, Estimate(self.times.s_per_goal_pair * pairs, 0.0)))
-        if not graph.has_cost_matrix:
+        if graph.parity_oracle is not None:
             tasks.append(Task("covers", self._covers, self._estimate_of_covers()))
         if walks_fit(graph, policy.gtsp.walks):
             tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
@@ -205,7 +204,7 @@ class Portfolio:
             yield
 
     def _goals(self) -> Steps[None]:
-        """Bound tours by one over the goals alone."""
+        """Bound tours by 1-trees over the goals and, where there are no covers, by a proof."""
         run, policy = self.run, self.policy.mip
 
         def prove_goals(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
@@ -213,7 +212,8 @@ class Portfolio:
             return goal_run.solve(self.backend, None), goal_run.cuts
 
         limits = Limits(run.clock, rng=run.rng)
-        yield from goal_bound_steps(self.graph, prove_goals, limits, policy=policy)
+        prove = _prove_nothing if self.graph.parity_oracle is not None else prove_goals
+        yield from goal_bound_steps(self.graph, prove, limits, policy=policy)
         self._adopt_bound_in_any_class()
 
     def _covers(self) -> Steps[None]:
@@ -221,16 +221,11 @@ class Portfolio:
         run, policy = self.run, self.policy.mip
         if run.tour is None:
             return
-        self._adopt_bound_in_any_class()
-
-        def prove_nothing(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
-            return prove(graph, MipParams(policy=policy), replace(limits, iterations=0)), ()
-
-        anyway = replace(policy, covers=replace(policy.covers, min_classes=0))
+        any_size = replace(policy, covers=replace(policy.covers, min_classes=0))
         limits = Limits(run.clock, rng=run.rng)
         costs = run.cover_costs() if run.uses_sparse_costs else CoverCosts()
         found = yield from goal_bound_steps(
-            self.graph, prove_nothing, limits, run.tour, costs, run.on_cover_bound, anyway
+            self.graph, _prove_nothing, limits, run.tour, costs, run.on_cover_bound, any_size
         )
         self._adopt_bound_in_any_class()
         run.raise_bound(found.bound)
@@ -298,3 +293,8 @@ class Portfolio:
             run.raise_bound(free.bound or 0.0)
             yield
         run.raise_bound(free.bound or 0.0)
+
+
+def _prove_nothing(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
+    """Return no bound: the first cover is that of the goals."""
+    return Result(None, None, None, Status.NO_SOLUTION_FOUND, ()), ()
