@@ -93,13 +93,7 @@ class ReactTether:
         return self.update(_tether(np.array([a, a])), r)
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """Return a tether laid along a path.
-
-        Parameters
-        ----------
-        path : array_like, shape (k, 3)
-            Path from the anchor to the robot, metres.
-        """
+        """Return a tether laid along a path (k, 3), metres, from the anchor to the robot."""
         points = np.asarray(path, dtype=float).reshape(-1, 3)
         if len(points) < 2:
             raise InputError(f"path: expected at least two points, got {len(points)}")
@@ -109,17 +103,7 @@ class ReactTether:
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
     ) -> Tether:
-        """Return the tether after a motion of the robot, the anchor, or both.
-
-        Parameters
-        ----------
-        tether : Tether
-            Tether before the motion; it is not changed.
-        robot : array_like, shape (3,)
-            New position of the robot, metres.
-        anchor : array_like, shape (3,), optional
-            New position of the anchor, metres; None if it has not moved.
-        """
+        """Return the tether after a motion of the robot, the anchor, or both."""
         nodes = tether.nodes
         is_text = self.reading == "text"
         ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
