@@ -74,12 +74,12 @@ def inset(
     v = counterclockwise(np.array(obstacle.polygon) - origin)
     disks = np.column_stack([v, np.full(len(v), c)])
     if c <= policy.min_clearance_ratio * place:
-        back = np.minimum(place, share * room(v, place / share))
-        shape = shapely.Polygon(v + back[:, None] * _inward(v))
+        offset = np.minimum(place, share * room(v, place / share))
+        shape = shapely.Polygon(v + offset[:, None] * _inward(v))
         if not shape.is_valid:  # needles from rounding: the full polygon is stricter
             shape = shapely.Polygon(v)
         ring = shapely.get_coordinates(shape)[:-1]
-        by = min(place, share * c) if c else float(back.max())
+        by = min(place, share * c) if c else float(offset.max())
         return Inset(shape, ring, np.arange(len(v)), disks, by)
     by = min(place, share * c)
     shape = shapely.Polygon(v).buffer(c - by, quad_segs=policy.corner_sides // 4)
@@ -160,8 +160,8 @@ def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float)
     shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
     reach = 2.0 * problem.clearance + TOUCHING_TOLERANCE * problem.scale + 2.0 * place
     # distance between a circle and the polygon that stands for it
-    back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
-    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
+    gap = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
+    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * gap)
 
     def _inside(i: int, point: Floats) -> Floats:
         """Return a point of the inset that a straight line within the obstacle joins to `point`."""

@@ -215,13 +215,13 @@ def back_from(problem: Problem, runs: list[list[Passage]], names: list[str], k: 
         Where to go back to: the latest visit at which the tether touches fewer of these obstacles,
         and the path home along the tether.
     """
-    here = [p for p in runs[k] if p.rests]
-    if not here:
+    touched = [p for p in runs[k] if p.rests]
+    if not touched:
         return "straight home: the tether lies against nothing"
     for j in range(k - 1, -1, -1):
-        there = [p for p in runs[j] if p.rests]
-        if len(there) < len(here) and here[: len(there)] == there:
-            freed = ", ".join(problem.obstacle_name(p.obstacle) for p in here[len(there) :])
+        earlier = [p for p in runs[j] if p.rests]
+        if len(earlier) < len(touched) and touched[: len(earlier)] == earlier:
+            freed = ", ".join(problem.obstacle_name(p.obstacle) for p in touched[len(earlier) :])
             return f"back the way it came to visit {j + 1} ({names[j]}), which clears {freed}"
-    home = ", ".join(f"{p.side} of {problem.obstacle_name(p.obstacle)}" for p in reversed(here))
+    home = ", ".join(f"{p.side} of {problem.obstacle_name(p.obstacle)}" for p in reversed(touched))
     return f"home along the tether: {home}"

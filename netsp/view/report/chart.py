@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
+from netsp.base.deprecated import deprecated_method
 from netsp.base.geometry import polylines
 from netsp.base.number_ranges import check_not_negative
 from netsp.model.problem import Circle, Problem
@@ -91,7 +92,7 @@ class View:
     Parameters
     ----------
     problem : Problem
-        What is shown.
+        Problem that is shown.
     more : ndarray, shape (n, 2) or (n, 3)
         Places that are to be seen, too.
     layout : ChartLayout
@@ -123,9 +124,11 @@ class View:
         self.height = self.bottom + layout.bottom
 
     @classmethod
-    def of(cls, problem: Problem, film: Film) -> View:
+    def of_film(cls, problem: Problem, film: Film) -> View:
         """Return the view that contains a problem and all moments of a film."""
         return cls(problem, np.vstack([m.nodes for m in film.moments]))
+
+    of = deprecated_method("of", "of_film")
 
     def point(self, p: npt.ArrayLike) -> list[float]:
         """Return the pixel of a place, x and y."""
@@ -154,7 +157,7 @@ def draw(
     Parameters
     ----------
     problem : Problem
-        What is shown.
+        Problem that is shown.
     solution : Solution
         Solution with the tour.
     view : View

@@ -34,7 +34,7 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
         A file of a run is damaged, or the page cannot be written.
     """
     films = [one.film(PageLayout.plane_frames) for one in opened]
-    views = [chart.View.of(one.problem, film) for one, film in zip(opened, films, strict=True)]
+    views = [chart.View.of_film(one.problem, film) for one, film in zip(opened, films, strict=True)]
     names = list(dict.fromkeys(one.problem.name for one in opened))
     title = f"{' and '.join(names)}: {len(opened)} side by side"
     sections = "".join(

@@ -52,7 +52,7 @@ def page(what: Opened) -> str:
     """
     problem, solution, run = what.problem, what.solution, what.run
     film, fates = what.film(PageLayout.plane_frames), what.fates
-    view = chart.View.of(problem, film)
+    view = chart.View.of_film(problem, film)
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     is_same_problem = problem.sha256 == solution.problem.sha256
     found = briefing.of_tour(problem, solution) if run is None else None

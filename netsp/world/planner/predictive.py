@@ -534,7 +534,7 @@ class PredictivePlanner(Planner):
         mission = self.mission
         return pull_in_stages(self.scene, path, mission.clearance, mission.delta, self.policy.paths)
 
-    def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
+    def _classes(self, retreat: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
         """Return the last pivot of each run of pivots that lead to paths of one class."""
         out: list[int] = []
         pivots = list(onward)
@@ -544,7 +544,7 @@ class PredictivePlanner(Planner):
                 j is None
                 or after is None
                 or not are_homotopic(
-                    self.scene, path, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
+                    self.scene, path, np.vstack([retreat[i : j + 1], after[1:]]), self.grid.cell
                 )
             ):
                 out.append(i)
