@@ -61,7 +61,7 @@ def _end_abandoned_work(code: int, grace_s: float) -> None:
     os._exit(code)
 
 
-def _main(argv: Sequence[str] | None, policy: CommandPolicy) -> int:
+def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -> int:
     """Run the command line; return the exit code, whatever work goes on."""
     begin_command()
     wanted: str | None = None
