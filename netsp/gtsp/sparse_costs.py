@@ -56,7 +56,7 @@ class SparseCosts:
     blocks
         Vertices (r,) and the costs (r, V) of their legs in single precision, block by block, until
         each vertex has come once.
-    own
+    cell
         (V,) cell of each vertex; negative for none.
     longest
         (m, m) largest cost of a leg between two cells that is kept.
@@ -75,7 +75,7 @@ class SparseCosts:
         self,
         vertices: int,
         blocks: Iterable[tuple[Ints, Floats]],
-        own: Ints,
+        cell: Ints,
         longest: Floats,
         tour: Ints,
         *,
@@ -86,12 +86,12 @@ class SparseCosts:
         mates[tour] = np.column_stack([np.roll(tour, 1), np.roll(tour, -1)])
         # vertices in no cell are put into a last one, which has no legs
         longest = np.pad(longest, (0, 1), constant_values=-np.inf)
-        own = np.where(own < 0, len(longest) - 1, own)
+        cell = np.where(cell < 0, len(longest) - 1, cell)
         first, size = np.zeros(vertices, dtype=np.int64), np.zeros(vertices, dtype=np.int64)
         other: Columns = np.zeros(0, dtype=np.int32)
         cost: Floats = np.zeros(0, dtype=np.float32)  # type: ignore[assignment]
         for rows, costs in blocks:
-            block = Block(rows, costs, own, longest, mates)
+            block = Block(rows, costs, cell, longest, mates)
             counts = np.zeros(len(rows), dtype=np.int64)
             self._share_rows(partial(_count, block, counts), len(rows))
             check_available(
@@ -131,17 +131,17 @@ class SparseCosts:
         if self.held.size.sum() < self.policy.min_packed_share * len(self.held.other):
             self._pack(np.ones(len(self), dtype=bool))
 
-    def add_above(self, own: Ints, dead: Bools) -> None:
+    def add_above(self, cell: Ints, dead: Bools) -> None:
         """Fix out all legs between cells whose own leg is fixed out.
 
         Parameters
         ----------
-        own
+        cell
             (V,) cell of each vertex.
         dead
             (m, m) mask of legs between cells.
         """
-        _drop_above(own, dead, self.held)
+        _drop_above(cell, dead, self.held)
 
     @property
     def left(self) -> int:
@@ -176,7 +176,7 @@ class Block(NamedTuple):
 
     rows: Ints
     costs: Floats
-    own: Ints
+    cell: Ints
     longest: Floats
     mates: Ints
 
@@ -185,13 +185,13 @@ class Block(NamedTuple):
 def _kept(k: int, block: Block, other: Columns, cost: Floats) -> int:
     """Return the number of legs of row k that are kept, and write as many of them as fit into
     `other` and `cost`."""
-    costs, longest = block.costs[k], block.longest[block.own[block.rows[k]]]
+    costs, longest = block.costs[k], block.longest[block.cell[block.rows[k]]]
     before, after = block.mates[block.rows[k]]
     top, count = longest.max(), 0
     for v in range(len(costs)):
         c = costs[v]
         # most legs are longer than any that is kept, and are passed over quickly
-        if (c <= top and c <= longest[block.own[v]]) or v in (before, after):
+        if (c <= top and c <= longest[block.cell[v]]) or v in (before, after):
             if c == np.inf:
                 continue
             if count < len(other):
@@ -256,11 +256,11 @@ def _drop_vertices(gone: Bools, rows: Rows) -> None:
 
 
 @kernel
-def _drop_above(own: Ints, dead: Bools, rows: Rows) -> None:
+def _drop_above(cell: Ints, dead: Bools, rows: Rows) -> None:
     for u in range(len(rows.first)):
         first, kept = rows.first[u], 0
         for k in range(first, first + rows.size[u]):
-            if not dead[own[u], own[rows.other[k]]]:
+            if not dead[cell[u], cell[rows.other[k]]]:
                 rows.other[first + kept], rows.cost[first + kept] = rows.other[k], rows.cost[k]
                 kept += 1
         rows.size[u] = kept

@@ -113,8 +113,8 @@ class Tree:
         while node is not None or open_nodes:
             if node is None:
                 node = heapq.heappop(open_nodes)
-            least = min(n.bound for n in (node, *open_nodes[:1]))
-            run.raise_bound(min(least, settled, run.cutoff))
+            lowest = min(n.bound for n in (node, *open_nodes[:1]))
+            run.raise_bound(min(lowest, settled, run.cutoff))
             if run.is_done:
                 return
             if node.bound >= run.cutoff:
@@ -230,16 +230,16 @@ class Tree:
         self, point: Point, alive: Bools, adjacent: tuple[tuple[int, int], ...]
     ) -> Iterator[Choice]:
         """Yield choices: a pair of clusters is adjacent or not, a vertex is visited or not."""
-        least = self.policy.min_fractionality
+        min_distance = self.policy.min_fractionality
         between = np.triu(cluster_flows(point.legs, point.y, self.cluster), 1)
         for g, h in adjacent:
             between[g, h] = 0.0  # a pair is charged once
-        for g, h in _most_fractional(between, self.policy.pair_candidates, least):
+        for g, h in _most_fractional(between, self.policy.pair_candidates, min_distance):
             legs = self.pair == g * self.clusters + h
             inside = np.isin(self.cluster, (g, h))
             cuts = [Cut(inside, g)] if g else []
             yield Choice((alive & ~legs, adjacent), (alive, (*adjacent, (g, h))), cuts)
-        for (v,) in _most_fractional(point.x, self.policy.vertex_candidates, least):
+        for (v,) in _most_fractional(point.x, self.policy.vertex_candidates, min_distance):
             others = self.cluster == self.cluster[v]
             others[v] = False
             at_v, elsewhere = (self.legs == v).any(axis=1), others[self.legs].any(axis=1)
@@ -257,12 +257,12 @@ class Tree:
         return Choice((without, adjacent), (within, adjacent), [])
 
 
-def _most_fractional(values: Floats, count: int, least: float) -> list[tuple[int, ...]]:
-    """Return the indices of the values farthest from whole numbers, farther than `least`."""
+def _most_fractional(values: Floats, count: int, min_distance: float) -> list[tuple[int, ...]]:
+    """Return the indices of the values farthest from whole numbers, farther than `min_distance`."""
     distance = np.minimum(values, 1.0 - values)
     order = np.argsort(-distance, axis=None, kind="stable")[:count]
     return [
         tuple(int(i) for i in np.unravel_index(k, values.shape))
         for k in order
-        if distance.ravel()[k] > least
+        if distance.ravel()[k] > min_distance
     ]

@@ -71,17 +71,17 @@ class ClassCovers:
         cell, order, row = self._members(cells)
         out = np.full((len(cells.cluster), len(cells.cluster)), np.inf)
         if isinstance(self._costs, SparseCosts):
-            _least_in_rows(self._costs.held, cell, out)
+            _fill_lowest_in_rows(self._costs.held, cell, out)
         else:
-            _least(self._costs, order, row, out)
+            _fill_lowest(self._costs, order, row, out)
         return out
 
     def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """Return the costs (k, n, 2) of the cheapest legs between two cells (k, 2), by parity."""
         cell, order, row = self._members(cells)
         if isinstance(self._costs, SparseCosts):
-            return _least_by_parity_in_rows(self._costs.held, self._odd, cell, order, row, ends)
-        return _least_by_parity(self._costs, self._odd, order, row, ends)
+            return _lowest_by_parity_in_rows(self._costs.held, self._odd, cell, order, row, ends)
+        return _lowest_by_parity(self._costs, self._odd, order, row, ends)
 
     def _members(self, cells: Cells) -> tuple[Ints, Ints, Ints]:
         """Return the cell of each vertex, the vertices by cell, and the start of each cell's."""
@@ -92,7 +92,7 @@ class ClassCovers:
 
 
 @kernel
-def _least(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
+def _fill_lowest(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
     """Fill in the least costs between the members of two cells."""
     cells = len(row) - 1
     cell = np.empty(len(order), dtype=np.int64)
@@ -107,7 +107,7 @@ def _least(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
 
 
 @kernel
-def _least_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: Ints) -> Floats:
+def _lowest_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: Ints) -> Floats:
     """Return the least costs (k, n, 2) between the members of two cells, by parity."""
     n = odd.shape[1]
     out = np.full((len(ends), n, 2), np.inf)
@@ -122,7 +122,7 @@ def _least_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: In
 
 
 @kernel
-def _least_in_rows(rows: Rows, cell: Ints, out: Floats) -> None:
+def _fill_lowest_in_rows(rows: Rows, cell: Ints, out: Floats) -> None:
     """Fill in the least costs of the legs left between two cells."""
     for u in range(len(cell)):
         for k in range(rows.first[u], rows.first[u] + rows.size[u]):
@@ -132,7 +132,7 @@ def _least_in_rows(rows: Rows, cell: Ints, out: Floats) -> None:
 
 
 @kernel
-def _least_by_parity_in_rows(
+def _lowest_by_parity_in_rows(
     rows: Rows, odd: Bools, cell: Ints, order: Ints, row: Ints, ends: Ints
 ) -> Floats:
     """Return the least costs (k, n, 2) of the legs left between two cells, by parity."""

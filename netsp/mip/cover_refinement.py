@@ -71,9 +71,9 @@ class CoverRefinement:
         if not left or len(known) >= policy.max_barriers:
             return []
         lengths = self.covers.costs_by_parity(cells, ends)
-        least = lengths.min(axis=2, keepdims=True)
-        least[np.isinf(least)] = 0.0  # no leg lies above such a leg
-        excess = y[:, None, None] * np.minimum(lengths - least, gap)
+        lowest = lengths.min(axis=2, keepdims=True)
+        lowest[np.isinf(lowest)] = 0.0  # no leg lies above such a leg
+        excess = y[:, None, None] * np.minimum(lengths - lowest, gap)
         excess = np.ascontiguousarray(excess.swapaxes(0, 1))
         new_cells = {}
         for i in left:

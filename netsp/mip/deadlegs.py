@@ -64,18 +64,18 @@ class DeadLegs:
         """Mark more legs (k, V) of a range of vertices as dead."""
         self.bits[rows] |= _packed(dead)
 
-    def add_above(self, own: Ints, dead: Bools) -> None:
+    def add_above(self, cell: Ints, dead: Bools) -> None:
         """Mark all legs between two cells as dead if the leg of the cells is.
 
         Parameters
         ----------
-        own
+        cell
             (V,) cell of each vertex.
         dead
             (m, m) mask of legs between cells.
         """
         for rows in self._blocks():
-            self.add(rows, dead[own[rows]][:, own])
+            self.add(rows, dead[cell[rows]][:, cell])
 
     def add_vertices(self, gone: Bools) -> None:
         """Mark all legs of the vertices of a mask (V,) as dead."""

@@ -96,8 +96,8 @@ def goal_bound_steps(
 ) -> Steps[GoalBound]:
     """Do what `bound_over_goals` does, with a step for each LP of a cover."""
     clock = Clock.from_limit(limits.time)
-    least = graph.distances_between_goals(lambda: clock.is_up)
-    bound = one_tree_bound(_finite(least), lambda: clock.is_up, policy.goals)
+    distances = graph.distances_between_goals(lambda: clock.is_up)
+    bound = one_tree_bound(_finite(distances), lambda: clock.is_up, policy.goals)
     cuts: tuple[Cut, ...] = ()
     cells: CellBound | None = None
     _raise_bound_in_any_class(graph, bound * (1.0 - PATH_ROUNDING))
@@ -105,7 +105,7 @@ def goal_bound_steps(
         run = _CoverRun(graph, tour, replace(limits, time=clock), costs, on_bound, policy)
         cells = yield from run.steps()
     if cells is None or graph.goal_count < policy.goals.max_proven_goals:
-        over = Instance.from_costs(least, range(graph.goal_count + 1))
+        over = Instance.from_costs(distances, range(graph.goal_count + 1))
         programs = policy.goals.max_programs
         if limits.iterations is not None:
             programs = min(limits.iterations, programs)
@@ -125,9 +125,9 @@ def bound_by_one_trees(graph: Instance, policy: GoalBoundPolicy = GoalBoundPolic
     clusters.
     """
     if not graph.bound_in_any_class:
-        least = graph.distances_between_goals(lambda: True)
-        left = iter(range(policy.untimed_legs // least.size))
-        bound = one_tree_bound(_finite(least), lambda: next(left, None) is None, policy)
+        distances = graph.distances_between_goals(lambda: True)
+        left = iter(range(policy.untimed_legs // distances.size))
+        bound = one_tree_bound(_finite(distances), lambda: next(left, None) is None, policy)
         _raise_bound_in_any_class(graph, bound * (1.0 - PATH_ROUNDING))
 
 
@@ -199,10 +199,10 @@ class _CoverRun:
         cell = cells.cells_of(graph.cluster, self.odd)
         above = np.flatnonzero(np.isin(cell, visited))
         count = self.policy.covers.classes_per_cell
-        least = cheapest_per_cluster(graph.costs_to_base[above], cell[above], count)
+        chosen = cheapest_per_cluster(graph.costs_to_base[above], cell[above], count)
         if not self.costs.is_over_kept_classes:
             _raise_bound_in_any_class(graph, bound)
-        better = self.on_bound(bound, len(cells.cluster), above[least])
+        better = self.on_bound(bound, len(cells.cluster), above[chosen])
         if better is None:
             return None
         self.tour = list(better)

@@ -166,9 +166,9 @@ class HighsRelaxation:
         n = len(cuts)
         block = cut_coefficients(cuts, self.cluster, self.legs)
         no_limit = np.full(n, highspy.kHighsInf)
-        least = np.array([-2.0 * c.rhs for c in cuts])
+        min_rows = np.array([-2.0 * c.rhs for c in cuts])
         entries, start, leg, values = _compressed(block)
-        self._highs.addRows(n, least, no_limit, entries, start, self._column[leg], values)
+        self._highs.addRows(n, min_rows, no_limit, entries, start, self._column[leg], values)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Remove the cuts that are neither marked nor needed by the basis."""

@@ -47,11 +47,11 @@ def rounding(duals: Duals, longest: float) -> float:
     return BOUND_ROUNDING * (size + len(duals.cluster) * largest)
 
 
-def least_of_clusters(values: Floats, cluster: Ints) -> Floats:
+def lowest_of_clusters(values: Floats, cluster: Ints) -> Floats:
     """Return the least value of the vertices of each cluster, shape (m + 1,)."""
-    least = np.full(int(cluster.max()) + 1, np.inf)
-    np.minimum.at(least, cluster, values)
-    return least
+    lowest = np.full(int(cluster.max()) + 1, np.inf)
+    np.minimum.at(lowest, cluster, values)
+    return lowest
 
 
 def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> Fraction:
@@ -82,6 +82,6 @@ def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> 
         r = 2 * degree[v] - cluster_dual[cluster[v]]
         r += sum(mu for c, mu in active if c.inside[v] and c.cluster != cluster[v])
         vertex.append(r + sum(sorted(legs[v])[:2]) / 2)
-    least = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
+    lowest = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
     rooms = sum((mu * Fraction(c.rhs) for c, mu in active), Fraction(0))
-    return Fraction(sum(cluster_dual) + sum(least) + rooms)
+    return Fraction(sum(cluster_dual) + sum(lowest) + rooms)

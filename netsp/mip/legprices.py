@@ -8,7 +8,7 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
-from netsp.mip.lagrangian_bound import least_of_clusters, rounding
+from netsp.mip.lagrangian_bound import lowest_of_clusters, rounding
 from netsp.mip.program import Duals
 
 
@@ -46,10 +46,10 @@ class LegPrices:
             if cut.teeth:
                 reduced[cut.in_tooth(cluster, legs)] -= mu
             vertex[cut.inside & (cluster != cut.cluster)] += mu
-        least, second = _two_least(legs, reduced, len(cluster))
-        cost = vertex + 0.5 * (least + second)
-        cheapest = least_of_clusters(cost, cluster)
-        self._legs, self._reduced, self._least, self._second = legs, reduced, least, second
+        lowest, second = _two_lowest(legs, reduced, len(cluster))
+        cost = vertex + 0.5 * (lowest + second)
+        cheapest = lowest_of_clusters(cost, cluster)
+        self._legs, self._reduced, self._lowest, self._second = legs, reduced, lowest, second
         self._above = vertex - cheapest[cluster]
         if np.isinf(cheapest).any():
             self.bound = float("inf")
@@ -61,18 +61,18 @@ class LegPrices:
         """Return the mask (k,) of legs whose tours all exceed the bound by more than a gap."""
         r = total = self._reduced
         for end in self._legs.T:
-            other = np.where(r <= self._least[end], self._second[end], self._least[end])
+            other = np.where(r <= self._lowest[end], self._second[end], self._lowest[end])
             total = total + self._above[end] + 0.5 * other
         return np.asarray(total > gap)
 
 
-def _two_least(legs: Ints, values: Floats, size: int) -> tuple[Floats, Floats]:
+def _two_lowest(legs: Ints, values: Floats, size: int) -> tuple[Floats, Floats]:
     """Return the two least values (V,) of the legs at each vertex, inf where legs are missing."""
     ends, leg_values = legs.ravel(), np.repeat(values, 2)
     order = np.lexsort((leg_values, ends))
     ends, leg_values = ends[order], np.append(leg_values[order], [np.inf, np.inf])
     first = np.searchsorted(ends, np.arange(size))
     count = np.bincount(ends, minlength=size)
-    least = np.where(count > 0, leg_values[first], np.inf)
+    lowest = np.where(count > 0, leg_values[first], np.inf)
     second = np.where(count > 1, leg_values[np.minimum(first + 1, len(leg_values) - 1)], np.inf)
-    return least, second
+    return lowest, second

@@ -286,12 +286,12 @@ class MipRun(SearchingRun):
         if self.graph.goal_count > self.mip_policy.large_goal_count:
             return policy.cover_share  # covers close the gap there
         if self.uses_sparse_costs and self.graph.goal_count <= policy.max_sparse_goals:
-            least = policy.min_sparse_share
+            min_share = policy.min_sparse_share
             share = policy.cover_share * (classes / policy.sparse_classes) ** 3
         else:
-            least = policy.goal_share
+            min_share = policy.goal_share
             share = policy.cover_share * (classes / policy.cover_classes) ** 2
-        return min(max(share, least), policy.cover_share)
+        return min(max(share, min_share), policy.cover_share)
 
     @property
     def _core_is_for_warm_start(self) -> bool:

@@ -185,7 +185,7 @@ def _across(p: int, ends: Ints, flow: Floats, sides: Bools) -> float:
 @kernel
 def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
     """Return the cost of sides, and the pair that is changed for it, -1 if none is."""
-    total, odd, least, at = 0.0, False, np.inf, -1
+    total, odd, lowest, at = 0.0, False, np.inf, -1
     for p in range(len(ends)):
         q = _across(p, ends, flow, sides)
         if q > 0.5:
@@ -193,11 +193,11 @@ def _cost(ends: Ints, flow: Floats, sides: Bools) -> tuple[float, int]:
             odd = not odd
         else:
             total += q
-        if abs(1.0 - 2.0 * q) < least:
-            least, at = abs(1.0 - 2.0 * q), p
+        if abs(1.0 - 2.0 * q) < lowest:
+            lowest, at = abs(1.0 - 2.0 * q), p
     if odd:
         return total, -1
-    return total + least, at
+    return total + lowest, at
 
 
 @interprets(_cheapest)

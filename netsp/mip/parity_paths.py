@@ -85,18 +85,18 @@ def _settle(
     other, price, shared = work_arrays(terms)
     cost, second_cost = paths.cost, paths.second_cost
     for _ in range(count):
-        u, least = -1, np.inf
+        u, lowest = -1, np.inf
         for v in range(len(cost)):
-            if not is_settled[v] and cost[v] < least:
-                u, least = v, cost[v]
-        if u < 0 or least > gap:
+            if not is_settled[v] and cost[v] < lowest:
+                u, lowest = v, cost[v]
+        if u < 0 or lowest > gap:
             return False
         is_settled[u] = True
         for i in range(reduced_costs_at(u, terms, other, price, shared)):
             v = other[i]
             if v == 0:
                 continue
-            new = least + leg_excess(u, v, price[i], terms) + excess[v]
+            new = lowest + leg_excess(u, v, price[i], terms) + excess[v]
             if new < cost[v]:
                 cost[v], second_cost[v], paths.before[v] = new, cost[v], u
             elif new < second_cost[v]:

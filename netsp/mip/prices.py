@@ -17,7 +17,7 @@ from netsp.base.compiled.kernel import kernel
 from netsp.gtsp.sparse_costs import EMPTY_ROWS, Rows, SparseCosts
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
-from netsp.mip.lagrangian_bound import least_of_clusters, rounding
+from netsp.mip.lagrangian_bound import lowest_of_clusters, rounding
 from netsp.mip.mip_policy import PricingPolicy
 from netsp.mip.parity_paths import BasePaths, leg_excess, paths_from_base
 from netsp.mip.program import Duals
@@ -64,12 +64,12 @@ class Prices:
         self._check, self._dead = check, dead
         self._size = len(cluster)
         terms = self._terms = _terms(costs, dead, cluster, cuts, duals)
-        least, second, vertex = terms.least, terms.second, terms.vertex
+        lowest, second, vertex = terms.lowest, terms.second, terms.vertex
         longest = np.empty(self._size)
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
-        self._more = least < 0.0
-        self._cost = vertex + 0.5 * (least + second)
-        self._cheapest = least_of_clusters(self._cost, cluster)
+        self._more = lowest < 0.0
+        self._cost = vertex + 0.5 * (lowest + second)
+        self._cheapest = lowest_of_clusters(self._cost, cluster)
         fixed = float((duals.cluster + self._cheapest).sum()) + duals.constant
         self.bound = fixed - rounding(duals, float(longest.max(initial=0.0)))
 
@@ -139,7 +139,7 @@ class Prices:
 def _terms(
     costs: Floats, dead: DeadLegs | SparseCosts, cluster: Ints, cuts: Sequence[Cut], duals: Duals
 ) -> Terms:
-    """Return the terms of reduced costs; `least` and `second` are to be filled in."""
+    """Return the terms of reduced costs; `lowest` and `second` are to be filled in."""
     size, m = len(cluster), int(cluster.max(initial=0)) + 1
     active = np.flatnonzero(duals.cut < 0.0).tolist()
     sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
@@ -169,7 +169,7 @@ def _terms(
         weight=np.array(weight, dtype=float),
         tooth_pairs=tooth_pairs,
         vertex=vertex,
-        least=np.empty(size),
+        lowest=np.empty(size),
         second=np.empty(size),
     )
 
@@ -184,16 +184,16 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     """Find the two least reduced costs of each row, and the largest absolute one."""
     other, price, shared = work_arrays(terms)
     for u in range(first, last):
-        least = second = np.inf
+        lowest = second = np.inf
         size = 0.0
         for i in range(reduced_costs_at(u, terms, other, price, shared)):
             r = price[i]
             size = max(size, abs(r))
-            if r < least:
-                least, second = r, least
+            if r < lowest:
+                lowest, second = r, lowest
             elif r < second:
                 second = r
-        terms.least[u], terms.second[u], longest[u] = least, second, size
+        terms.lowest[u], terms.second[u], longest[u] = lowest, second, size
 
 
 @kernel
@@ -234,8 +234,8 @@ def excess_with_ends(u: int, v: int, price: float, above: Floats, terms: Terms) 
 
     Each end pays for half of the leg and half of its cheapest other leg.
     """
-    at_u = terms.second[u] if price <= terms.least[u] else terms.least[u]
-    at_v = terms.second[v] if price <= terms.least[v] else terms.least[v]
+    at_u = terms.second[u] if price <= terms.lowest[u] else terms.lowest[u]
+    at_v = terms.second[v] if price <= terms.lowest[v] else terms.lowest[v]
     return float(above[u] + above[v] + price + 0.5 * (at_u + at_v))
 
 

@@ -25,8 +25,9 @@ class Terms(NamedTuple):
     `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds the vertices
     `member[first_member[k] : first_member[k + 1]]`, both ascending, and has the term `weight[k]`.
     `tooth_pairs` (m + 1, m + 1) is the sum over the teeth that hold both clusters, `vertex` r_v,
-    `least` and `second` are r_uv of the two cheapest legs of each vertex. The legs are those of the
-    matrix `costs` without `dead`, the bits of `DeadLegs`; or those of `rows`, if it is not empty.
+    `lowest` and `second` are r_uv of the two cheapest legs of each vertex. The legs are those of
+    the matrix `costs` without `dead`, the bits of `DeadLegs`; or those of `rows`, if it is not
+    empty.
     """
 
     costs: Floats
@@ -41,7 +42,7 @@ class Terms(NamedTuple):
     weight: Floats
     tooth_pairs: Floats
     vertex: Floats
-    least: Floats
+    lowest: Floats
     second: Floats
 
 

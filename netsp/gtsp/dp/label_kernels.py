@@ -51,13 +51,13 @@ class Bounds(NamedTuple):
 
 @kernel
 def completions(
-    graph: Graph, prices: Floats, alive: Bools, least: Floats, onward: Floats, stop: Ints
+    graph: Graph, prices: Floats, alive: Bools, lowest: Floats, onward: Floats, stop: Ints
 ) -> None:
     """Fill bounds on the completion of labels: walks that remember only the goal before the last.
 
     Parameters
     ----------
-    least
+    lowest
         (n + 1, V) minimum cost of k visits that end at v.
     onward
         (n + 1, n + 1, V) minimum cost of k visits, the last to goal h, and of the leg from there to
@@ -70,14 +70,14 @@ def completions(
     n = len(start) - 2
     second = np.full((n + 1, count), np.inf)
     before = np.full((n + 1, count), -1, dtype=np.int64)
-    least[:] = np.inf
+    lowest[:] = np.inf
     onward[:] = np.inf
     for v in range(1, count):
         if alive[1, v]:
-            least[1, v] = costs[0, v] - prices[goal[v]]
+            lowest[1, v] = costs[0, v] - prices[goal[v]]
     for k in range(1, n + 1):
         for v in range(1, count):
-            best = least[k, v]
+            best = lowest[k, v]
             if best == np.inf:
                 continue
             if stop[0] != 0:
@@ -105,31 +105,31 @@ def completions(
                     a, b, last = d, a, h
                 elif d < b:
                     b = d
-            least[k + 1, u] = a - prices[goal[u]]
+            lowest[k + 1, u] = a - prices[goal[u]]
             second[k + 1, u] = b - prices[goal[u]]
             before[k + 1, u] = last
 
 
 @interprets(completions)
 def _completions_in_numpy(
-    graph: Graph, prices: Floats, alive: Bools, least: Floats, onward: Floats, stop: Ints
+    graph: Graph, prices: Floats, alive: Bools, lowest: Floats, onward: Floats, stop: Ints
 ) -> None:
     """Vectorise `completions` over the vertices of a goal."""
     costs, goal, start = graph
     n = len(start) - 2
-    second = np.full(least.shape, np.inf)
-    before = np.full(least.shape, -1, dtype=np.int64)
-    least[:] = np.inf
+    second = np.full(lowest.shape, np.inf)
+    before = np.full(lowest.shape, -1, dtype=np.int64)
+    lowest[:] = np.inf
     onward[:] = np.inf
     first = np.where(alive[1], costs[0] - prices[goal], np.inf)
-    least[1, 1:] = first[1:]
+    lowest[1, 1:] = first[1:]
     for k in range(1, n + 1):
         for h in range(1, n + 1):
             if stop[0] != 0:
                 return
             own = slice(start[h], start[h + 1])
             is_back = before[k, own, None] == goal
-            cost = np.where(is_back, second[k, own, None], least[k, own, None])
+            cost = np.where(is_back, second[k, own, None], lowest[k, own, None])
             onward[k, h] = np.fmin.reduce(cost + costs[own], axis=0, initial=np.inf)
             onward[k, h, own] = np.inf
         if k == n:
@@ -139,7 +139,7 @@ def _completions_in_numpy(
         best, other = ascending[0], ascending[1] if n > 1 else np.full(len(goal), np.inf)
         here = alive[k + 1].copy()
         here[0] = False
-        least[k + 1, here] = (best - prices[goal])[here]
+        lowest[k + 1, here] = (best - prices[goal])[here]
         second[k + 1, here] = (other - prices[goal])[here]
         before[k + 1, here] = np.where(best < np.inf, last, -1)[here]
 

@@ -194,15 +194,15 @@ class Walks:
         # a walk's k-th visit is the (n + 1 - k)-th from its end
         mirrored = np.concatenate([self.alive[:1], self.alive[:0:-1]])
         own, rest = (mirrored, self.alive) if backwards else (self.alive, mirrored)
-        least = np.empty((n + 1, len(goal)))
+        lowest = np.empty((n + 1, len(goal)))
         onward = np.empty((n + 1, n + 1, len(goal)))
-        completions(self._graph, prices, np.ascontiguousarray(rest), least, onward, self.stop)
+        completions(self._graph, prices, np.ascontiguousarray(rest), lowest, onward, self.stop)
         check()
         bits, tables = self.memory.bits, self.memory.tables(backwards=backwards)
         none = np.zeros(0, dtype=np.int32)
         layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
         with np.errstate(invalid="ignore"):  # inf - inf: no cut and no completion
-            limits = np.where(own[1:], cut - least[:0:-1], -np.inf)
+            limits = np.where(own[1:], cut - lowest[:0:-1], -np.inf)
         first = self.values[0]
         kept = np.isfinite(first) & (first <= limits[0])
         layers.append(
@@ -252,10 +252,10 @@ class Walks:
 
     def _near(self) -> Ints:
         """Return the goals (n + 1, n + 1) by their shortest leg from each goal, nearest first."""
-        least = np.zeros((len(self.goal), self.n + 1))
+        lowest = np.zeros((len(self.goal), self.n + 1))
         for rows in self._blocks():
-            least[rows] = np.minimum.reduceat(self.values[rows], self.start[:-1], axis=1)
-        between = np.minimum.reduceat(least, self.start[:-1], axis=0)
+            lowest[rows] = np.minimum.reduceat(self.values[rows], self.start[:-1], axis=1)
+        between = np.minimum.reduceat(lowest, self.start[:-1], axis=0)
         return np.argsort(between, axis=1, kind="stable")
 
 

@@ -96,7 +96,7 @@ def carry_on(
     longer = 0.0
     while True:
         p, begin, size = prior[c], start[c], start[c + 1] - start[c]
-        least = np.inf
+        lowest = np.inf
         for j in range(size):
             best = np.inf
             for i in range(start[p], start[p + 1]):
@@ -104,21 +104,21 @@ def carry_on(
                 if d < best:
                     best = d
             row[j] = best
-            least = min(least, best)
+            lowest = min(lowest, best)
         if c == p:
-            least = 0.0  # the base alone
-        longer += least - grown[c]
-        grown[c] = least
+            lowest = 0.0  # the base alone
+        longer += lowest - grown[c]
+        grown[c] = lowest
         if c == 0:
             return float(longer)
         even = sure <= 0
         for j in range(size):
-            if abs(row[j] - least - ahead[c, j]) > EQUAL_LENGTHS * row[j]:
+            if abs(row[j] - lowest - ahead[c, j]) > EQUAL_LENGTHS * row[j]:
                 even = False
         if even:
             return float(longer)
         for j in range(size):
-            ahead[c, j] = row[j] - least
+            ahead[c, j] = row[j] - lowest
         sure -= 1
         c = after[c]
 
@@ -142,12 +142,12 @@ def _carry_on_in_numpy(
         legs = costs[start[p] : start[p + 1], begin:end]
         best = np.fmin.reduce(ahead[p, : len(legs), None] + legs, axis=0, initial=np.inf)
         row[: len(best)] = best
-        least = 0.0 if c == p else float(best.min(initial=np.inf))
-        longer += least - float(grown[c])
-        grown[c] = least
+        lowest = 0.0 if c == p else float(best.min(initial=np.inf))
+        longer += lowest - float(grown[c])
+        grown[c] = lowest
         if c == 0:
             return longer
-        rest = best - least
+        rest = best - lowest
         if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EQUAL_LENGTHS * best).any():
             return longer
         ahead[c, : len(best)] = rest

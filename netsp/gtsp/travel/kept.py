@@ -37,14 +37,14 @@ def with_bound(result: Result, bound: LowerBound) -> Result:
     )
 
 
-def with_classes_left_out(result: Result, least: float, scope: Scope, because: str) -> Result:
+def with_classes_left_out(result: Result, min_length: float, scope: Scope, because: str) -> Result:
     """Return a result over some classes with a bound for a scope that includes the others.
 
     Parameters
     ----------
     result : Result
         Result over the classes kept.
-    least : float
+    min_length : float
         Lower bound on tours that use a class left out.
     scope : Scope
         Scope of all classes together.
@@ -58,4 +58,4 @@ def with_classes_left_out(result: Result, least: float, scope: Scope, because: s
     """
     if result.bound is None:
         return result
-    return with_bound(result, result.bound.or_elsewhere(least, scope, because))
+    return with_bound(result, result.bound.or_elsewhere(min_length, scope, because))
