@@ -729,14 +729,14 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
 def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
     policy = MipPolicy(many_goals=5, cuts=CutPolicy(max_idle_rounds=1))
     ends = []
-    proven = root.Root.solve
+    proven = root.Root.steps
 
     def prove(self):
         began = self.lp.pool.for_good.sum()
-        proven(self)
+        yield from proven(self)
         ends.append((began, self.lp.pool.for_good.sum(), len(self.lp.pool)))
 
-    monkeypatch.setattr(root.Root, "solve", prove)
+    monkeypatch.setattr(root.Root, "steps", prove)
     solve(travel_graph(far_world(1, goals=25, tether_length=300.0)), {"policy": policy})
     began, left, cuts = ends[-1]
     assert 0 < began == left < cuts
