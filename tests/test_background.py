@@ -205,7 +205,7 @@ def test_each_process_runs_all_steps_and_first_those_of_no_other(jobs):
     steps = [(str(k), partial(runs.append, k)) for k in range(7)]
     for part in range(jobs):
         runs.clear()
-        warm_up._compile(warm_up._own_first(steps, part, jobs), True)
+        warm_up._compile(warm_up._part_first(steps, part, jobs), True)
         assert sorted(runs) == list(range(7))
         begins += runs[: len(range(part, 7, jobs))]
     assert sorted(begins) == list(range(7))

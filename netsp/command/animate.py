@@ -9,11 +9,11 @@ from pathlib import Path
 from netsp.base.errors import InputError
 
 PAGE = ".html"
-"""Ending of films that are pages."""
+"""File-name extension of films that are pages."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Draw, and return the exit code."""
+    """Write the film, and return the exit code."""
     from netsp.view.pictures.animation import FORMATS, save_animation
     from netsp.view.report.opened import open_result
 
@@ -35,29 +35,32 @@ def run(args: argparse.Namespace) -> int:
     count = args.seconds * args.fps
     films = [open_result(source, args.problem).film(count) for source in args.source]
 
-    def tell(done: int, of: int) -> None:
-        print(f"\r{done} of {of} pictures", end="" if done < of else "\r\x1b[K", file=sys.stderr)
+    def show_progress(done: int, total: int) -> None:
+        print(
+            f"\r{done} of {total} pictures", end="" if done < total else "\r\x1b[K", file=sys.stderr
+        )
 
-    loud = not args.quiet and sys.stderr.isatty()
-    save_animation(films, args.output, args.seconds, args.fps, tell if loud else None)
-    return _animate_runs(args)
+    is_shown = not args.quiet and sys.stderr.isatty()
+    save_animation(films, args.output, args.seconds, args.fps, show_progress if is_shown else None)
+    return _report_picture(args)
 
 
-def _animate_runs(args: argparse.Namespace) -> int:
+def _report_picture(args: argparse.Namespace) -> int:
+    """Print the name of the picture, and return the exit code."""
     if not args.quiet:
         print(f"picture {args.output}", file=sys.stderr)
     return 0
 
 
 def _page(args: argparse.Namespace) -> int:
-    """Write a page that plays."""
+    """Write the film as a page with a slider, and return the exit code."""
     from netsp.view.report.opened import Opened, OpenedMission, open_result
 
-    found = [open_result(source, args.problem) for source in args.source]
-    missions = [what for what in found if isinstance(what, OpenedMission)]
-    tours = [what for what in found if isinstance(what, Opened)]
+    results = [open_result(source, args.problem) for source in args.source]
+    missions = [result for result in results if isinstance(result, OpenedMission)]
+    tours = [result for result in results if isinstance(result, Opened)]
     if missions and tours:
-        sources = dict(zip(map(type, found), args.source, strict=True))
+        sources = dict(zip(map(type, results), args.source, strict=True))
         raise InputError(
             f"SOURCE: {sources[OpenedMission]} is in space and {sources[Opened]} is not; expected "
             "a page of one kind"
@@ -66,7 +69,7 @@ def _page(args: argparse.Namespace) -> int:
         from netsp.view.pictures.film_page import save_page
         from netsp.view.pictures.picture_layout import PageLayout
 
-        films = [what.film(PageLayout.frames) for what in missions]
+        films = [result.film(PageLayout.frames) for result in missions]
         names = dict.fromkeys(film.title.split("\n")[0] for film in films)
         save_page(films, " and ".join(names), args.output)
     elif len(tours) > 1:
@@ -77,4 +80,4 @@ def _page(args: argparse.Namespace) -> int:
         from netsp.view.report.result_page import write_result_page
 
         write_result_page(args.source[0], tours[0], args.output)
-    return _animate_runs(args)
+    return _report_picture(args)

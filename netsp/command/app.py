@@ -39,14 +39,14 @@ def _document(name: str | None) -> tuple[Document, list[str]]:
             f"{name}: is a map, and saving its problem would overwrite it; give the map another "
             "extension, such as .geojson or .plan"
         )
-    found = import_site(name)
-    record = found.problem.site
+    imported = import_site(name)
+    record = imported.problem.site
     assert record is not None
-    show_table(name, found)
-    for text in import_warnings(found.problem):
+    show_table(name, imported)
+    for text in import_warnings(imported.problem):
         messages.warning(text)
-    notes = [f"{path.name}: {without_options(n)}" for n in found.notes if n not in record.notes]
-    return Document(target, json.loads(found.problem.to_json())), notes
+    notes = [f"{path.name}: {without_options(n)}" for n in imported.notes if n not in record.notes]
+    return Document(target, json.loads(imported.problem.to_json())), notes
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,14 +59,14 @@ def run(args: argparse.Namespace) -> int:
     from netsp.app.server import application
     from netsp.app.state import Document
 
-    looked_at, notes = None, list[str]()
+    shown, notes = None, list[str]()
     if args.show:
         from netsp.app.shown import read_shown
 
         if args.problem is None:
             raise InputError("--show: expected a solution file, or the folder of a run")
-        looked_at = read_shown(args.problem, args.problem_file)
-        document = Document(None, looked_at.data)
+        shown = read_shown(args.problem, args.problem_file)
+        document = Document(None, shown.data)
     elif args.problem_file is not None:
         raise InputError("--problem: goes with --show only")
     else:
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         port = listening.getsockname()[1]
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{port}/?token={token}"
-        session = Session(document, float(args.time_limit), looked_at, notes)
+        session = Session(document, float(args.time_limit), shown, notes)
         print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
         if not args.no_browser:
             threading.Timer(0.5, webbrowser.open, [address]).start()

@@ -1,4 +1,4 @@
-"""`netsp base`: where to stand."""
+"""`netsp base`: rank candidates for the place of the base by their tours."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         places = over_grid(args.grid, problem)
 
-    def tell(candidate: Candidate, left: int) -> None:
-        found = "no tour" if candidate.length is None else f"tour {candidate.length:.6g}"
-        print(f"{candidate.name}: {found}; {left} may be better", file=sys.stderr)
+    def show_candidate(candidate: Candidate, n_open: int) -> None:
+        outcome = "no tour" if candidate.length is None else f"tour {candidate.length:.6g}"
+        print(f"{candidate.name}: {outcome}; {n_open} may be better", file=sys.stderr)
 
     search = best_base(
         problem,
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         every=args.every,
         time_limit=clock,
         seed=args.seed,
-        on_candidate=None if args.quiet else tell,
+        on_candidate=None if args.quiet else show_candidate,
     )
     print(f"{'rank':>4}  {'place':<12} {'x':>10} {'y':>10} {'tether':>10} {'tour':>12}  status")
     for k, c in enumerate(search.candidates[: args.top], 1):

@@ -80,31 +80,33 @@ class Option:
         return getattr(args, self.attribute)
 
     def is_given(self, args: argparse.Namespace) -> bool:
-        """Return whether the option was given, and not as its default."""
+        """Return whether the option was given, with a value other than its default."""
         return self.value(args) not in (self.default, False, [])
 
     def add_to(self, parser: argparse._ActionsContainer) -> None:
         """Add the argument to a parser."""
-        how: dict[str, Any] = {"help": self._help()}
+        settings: dict[str, Any] = {"help": self._help()}
         if self.default is not None:
-            how["default"] = self.default
+            settings["default"] = self.default
         flags, has_opposite = self.flags, ", --no-" in self.usage
         if has_opposite:
-            how["action"] = argparse.BooleanOptionalAction
+            settings["action"] = argparse.BooleanOptionalAction
         elif value := self.usage.split()[len(flags) :]:
-            how |= {"type": self.type, **_value(" ".join(value), len(value))}
-            if how["nargs"] == "?":
-                how["const"] = self.const
+            settings |= {"type": self.type, **_value(" ".join(value), len(value))}
+            if settings["nargs"] == "?":
+                settings["const"] = self.const
             if self.repeats:
-                how |= {"action": "append", "default": []}
+                settings |= {"action": "append", "default": []}
         else:
-            how |= {"action": "store_true", "default": False}
+            settings |= {"action": "store_true", "default": False}
         if self.required:
-            how["required"] = True
+            settings["required"] = True
         if not flags:
-            parser.add_argument(self.attribute, **how)
+            parser.add_argument(self.attribute, **settings)
         else:
-            parser.add_argument(*flags[: 1 if has_opposite else None], dest=self.attribute, **how)
+            parser.add_argument(
+                *flags[: 1 if has_opposite else None], dest=self.attribute, **settings
+            )
 
     def _help(self) -> str | None:
         text = self.text
@@ -120,7 +122,7 @@ class Option:
 
 
 def _value(usage: str, count: int) -> dict[str, Any]:
-    """Return how argparse reads a value that help shows like this."""
+    """Return the arguments of `add_argument` for a value, by its form in the usage."""
     if usage.startswith("{"):
         return {"choices": usage.strip("{}").split(","), "nargs": None}
     is_optional, is_many = usage.startswith("["), "..." in usage
@@ -140,7 +142,7 @@ class Output(Option):
 
 
 class Data(Output):
-    """File of data, which go to standard output by default: then there is no room for `--json`."""
+    """File of data. Without it, data go to standard output, which rules out `--json`."""
 
 
 class Picture(Output):
@@ -149,7 +151,7 @@ class Picture(Output):
 
 @dataclass(frozen=True)
 class Group:
-    """Options with a title of their own in the help.
+    """Options under a common title in the help.
 
     Parameters
     ----------
@@ -197,7 +199,7 @@ def add_options(parser: Any, options: Options) -> None:
 
 
 def each_option(options: Options) -> Iterator[Option]:
-    """Yield options, and those of groups."""
+    """Yield all options, including those within groups."""
     for each in options:
         yield from (each,) if isinstance(each, Option) else each.options
 
@@ -217,9 +219,9 @@ def refuse(args: argparse.Namespace, names: str, reason: str) -> None:
 
 def files_of(args: argparse.Namespace, kind: type[Option]) -> list[str]:
     """Return the files that were given for options of a kind."""
-    every = [each for each in each_option(args.declared.options) if isinstance(each, kind)]
-    given = [each.value(args) for each in every if each.value(args) is not None]
-    return [file for value in given for file in (value if isinstance(value, list) else [value])]
+    matching = [each for each in each_option(args.declared.options) if isinstance(each, kind)]
+    values = [each.value(args) for each in matching if each.value(args) is not None]
+    return [file for value in values for file in (value if isinstance(value, list) else [value])]
 
 
 def check_stdout(args: argparse.Namespace) -> None:

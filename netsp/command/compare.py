@@ -89,7 +89,7 @@ def study_of(args: argparse.Namespace) -> Study:
 
 
 class Bar:
-    """One line that is drawn over, on a terminal; a line now and then elsewhere."""
+    """Progress of a study: one line redrawn on a terminal, lines at intervals elsewhere."""
 
     def __init__(
         self, stream: TextIO, quiet: bool, policy: CommandPolicy = CommandPolicy()
@@ -100,7 +100,7 @@ class Bar:
         self._interval_s = policy.redraw_interval_s if self.live else policy.trial_interval_s
 
     def show(self, row: TrialRow, tally: Tally) -> None:
-        """After a trial."""
+        """Show the progress after a trial, if a line is due."""
         from netsp.study.compare.rows import FAILED
 
         if self.quiet:
@@ -112,17 +112,17 @@ class Bar:
         if now - self.shown < self._interval_s and tally.done < tally.total:
             return
         self.shown = now
-        fresh = tally.done - tally.begun
-        left = (now - self.begin) / fresh * (tally.total - tally.done)
+        n_new = tally.done - tally.begun
+        left_s = (now - self.begin) / n_new * (tally.total - tally.done)
         text = (
-            f"{tally.done}/{tally.total} trials, {tally.failed} failed, {span(left)} left, "
+            f"{tally.done}/{tally.total} trials, {tally.failed} failed, {span(left_s)} left, "
             f"last {describe_row(row)}"
         )
         self._clear()
         print(text[:118], end="" if self.live else "\n", file=self.stream, flush=True)
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the redrawn line with a line break."""
         if self.live and not self.quiet:
             print(file=self.stream)
 
@@ -132,7 +132,7 @@ class Bar:
 
 
 def describe_row(row: TrialRow) -> str:
-    """Return a trial in a few words."""
+    """Return a short description of a trial."""
     world = row["world"]
     return (
         f"{row['solver']['label']} on {world['family']}-{world['seed']}, {world['goals']} goals, "

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 TABLES = (".csv", ".json")
+"""File-name extensions of tables."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
         stage = None
         if not args.quiet:
             stage = stack.enter_context(Stages(sys.stderr, args.time_limit, args.policy))
-        found = compare_paths(
+        comparison = compare_paths(
             problem,
             paths,
             solution,
@@ -52,33 +53,35 @@ def run(args: argparse.Namespace) -> int:
             on_stage=stage or (lambda text: None),
         )
     if args.json:
-        json_output.tell(found.to_dict())
+        json_output.tell(comparison.to_dict())
     elif args.output == STANDARD:
-        sys.stdout.write(found.to_csv())
+        sys.stdout.write(comparison.to_csv())
     elif not args.quiet:
-        print(describe(found))
+        print(describe(comparison))
     if args.output not in (None, STANDARD):
         import json
 
         as_table = args.output.lower().endswith(".csv")
-        text = found.to_csv() if as_table else json.dumps(found.to_dict(), indent=1) + "\n"
+        text = (
+            comparison.to_csv() if as_table else json.dumps(comparison.to_dict(), indent=1) + "\n"
+        )
         write_text(args.output, text)
     if args.plot is not None:
         from netsp.view.pictures import style
         from netsp.view.pictures.path_picture import draw_comparison
 
-        style.save(draw_comparison(found), args.plot)
+        style.save(draw_comparison(comparison), args.plot)
     if args.html is not None:
         from netsp.view.report.path_page import page
 
-        write_text(args.html, page(found))
+        write_text(args.html, page(comparison))
     if not args.quiet:
         for name, file in (("table", args.output), ("picture", args.plot), ("page", args.html)):
             if file not in (None, STANDARD):
                 print(f"{name:<8} {file}", file=sys.stderr)
-    if found.tour is None:
-        messages.warning(f"there is no tour to compare with: {found.tour_note}")
-        return EXIT_INFEASIBLE if found.is_infeasible else EXIT_NOT_ALL
+    if comparison.tour is None:
+        messages.warning(f"there is no tour to compare with: {comparison.tour_note}")
+        return EXIT_INFEASIBLE if comparison.is_infeasible else EXIT_NOT_ALL
     return 0
 
 
@@ -104,13 +107,13 @@ def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
     problem = Problem.load(problem_file)
     paths = []
     for file, label in files:
-        found = read_any_paths(
+        paths_of_file = read_any_paths(
             file, problem, frame=args.frame, system=args.system, noise=args.noise
         )
         if not args.quiet:
-            for note in dict.fromkeys(note for path in found for note in path.notes):
+            for note in dict.fromkeys(note for path in paths_of_file for note in path.notes):
                 messages.note(note)
-        paths += [replace(p, name=label) for p in found] if label else found
+        paths += [replace(p, name=label) for p in paths_of_file] if label else paths_of_file
     return problem, paths
 
 

@@ -255,10 +255,10 @@ def _folder_compile_time_s(kernel: Any) -> float:
     folder, total_s = Path(kernel.py_func.__code__.co_filename).parent, 0.0
     lock = lock_file(kernel)
     indexes = [] if lock is None else lock.parent.glob("*.nbi")
-    kept = {index.name.rpartition("-")[0] for index in indexes}
+    on_disk = {index.name.rpartition("-")[0] for index in indexes}
     for function in functions_to_compile():
         file = Path(function.__code__.co_filename)
-        if file.parent == folder and f"{file.stem}.{function.__qualname__}" not in kept:
+        if file.parent == folder and f"{file.stem}.{function.__qualname__}" not in on_disk:
             total_s += current_policy().compile_time_s(len(function.__code__.co_code))
     return total_s
 
@@ -276,5 +276,7 @@ def compile_time_s(kernel: Any, with_called: bool = False) -> float:
     from netsp.base.compiled.compile_policy import current_policy
 
     bytecode_size = len(kernel.py_func.__code__.co_code)
-    whole = getattr(kernel, "bytecode", None) if with_called else None
-    return current_policy().compile_time_s(whole() if whole is not None else bytecode_size)
+    bytecode_with_called = getattr(kernel, "bytecode", None) if with_called else None
+    return current_policy().compile_time_s(
+        bytecode_with_called() if bytecode_with_called is not None else bytecode_size
+    )

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def _names(command: str) -> dict[str, list[str]]:
-    """Names that options of a command take; those of other packages are among them."""
+    """Return the names that options of a command take, including those of other packages."""
     from netsp.exchange.missions.mission_files import FORMATS
     from netsp.plan.random_worlds import FAMILIES
     from netsp.plan.solver_table import ROADMAPS, SOLVERS
@@ -42,10 +42,10 @@ def run(args: argparse.Namespace) -> int:
     from netsp.command.main import parser_of_all
 
     parser = parser_of_all()
-    for choice in _of_commands(parser):
+    for choice in _command_actions(parser):
         choice.help = None  # what has no help in the usage is not completed
     for name, command in (
-        pair for choice in _of_commands(parser) for pair in choice.choices.items()
+        pair for choice in _command_actions(parser) for pair in choice.choices.items()
     ):
         names = _names(name)
         for action in command._actions:
@@ -59,5 +59,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _of_commands(parser: argparse.ArgumentParser) -> list[argparse._SubParsersAction[Any]]:
+def _command_actions(parser: argparse.ArgumentParser) -> list[argparse._SubParsersAction[Any]]:
+    """Return the actions of a parser that choose a command."""
     return [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]

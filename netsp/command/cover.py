@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
         note_scene(scene.name, scene.reading_notes())
     stages = None if args.quiet else Stages(sys.stderr, clock.left, args.policy)
     with stages or contextlib.nullcontext():
-        found = cover(
+        result = cover(
             scene,
             anchor=anchor,
             start=start,
@@ -50,23 +50,23 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             on_progress=stages,
         )
-    placed = args.scene if args.output is None else relative_to_file(args.scene, args.output)
-    write_mission(found.mission, placed, args.output)
+    scene_path = args.scene if args.output is None else relative_to_file(args.scene, args.output)
+    write_mission(result.mission, scene_path, args.output)
     if args.plot:
         from netsp.view.pictures.cover_picture import save
 
-        save(found, scene, args.plot)
+        save(result, scene, args.plot)
     if not args.quiet:
-        print(_summary(found, scene.units, args.output, args.plot), file=sys.stderr)
+        print(_summary(result, scene.units, args.output, args.plot), file=sys.stderr)
     if args.json:
         json_output.tell(
             {
-                "waypoints": len(found.viewpoints),
-                "fewest_possible": found.bound,
-                "seen": found.seen,
-                "visible": found.visible,
-                "candidates": found.candidates,
-                "tether_length": found.mission.tether_length,
+                "waypoints": len(result.viewpoints),
+                "fewest_possible": result.bound,
+                "seen": result.seen,
+                "visible": result.visible,
+                "candidates": result.candidates,
+                "tether_length": result.mission.tether_length,
                 "units": scene.units,
             }
         )
@@ -87,7 +87,7 @@ def _camera(text: str, patch: float) -> Camera:
     try:
         return Camera(**dict(zip(names, values, strict=False)), patch=patch)
     except InputError as error:
-        # of what was given, or of the patch, which has a flag of its own
+        # the values of --camera are wrong, or that of --patch
         message = str(error).removeprefix("Camera: ")
         flag = "--patch" if message.startswith("patch") else "--camera"
         raise InputError(f"{flag}: {message}") from None
@@ -96,8 +96,8 @@ def _camera(text: str, patch: float) -> Camera:
 def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> str:
     """Return the result in a few lines."""
     mission, count = found.mission, len(found.viewpoints)
-    less = 100.0 * (1.0 - found.bound / count)
-    fewest = f"no choice among them has fewer than {found.bound}, {less:.1f} % less"
+    percent_less = 100.0 * (1.0 - found.bound / count)
+    fewest = f"no choice among them has fewer than {found.bound}, {percent_less:.1f} % less"
     if count == found.bound:
         fewest = "no choice among them has fewer"
     lines = [

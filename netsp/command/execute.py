@@ -1,4 +1,4 @@
-"""`netsp execute`: a tour carried out, and repaired on the way."""
+"""`netsp execute`: carry a tour out, and repair it on the way."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def _mission(args: argparse.Namespace) -> int:
     options = PlannerOptions(seed=args.seed)
     if args.planning_limit is not None:
         options = replace(options, planning_limit=args.planning_limit)
-    how = {"vehicle": args.vehicle, "options": options, "seed": args.seed}
-    (run,) = fly(mission, [planner], args, is_judged=True, **how)
+    flight_options = {"vehicle": args.vehicle, "options": options, "seed": args.seed}
+    (run,) = fly(mission, [planner], args, is_judged=True, **flight_options)
     home = run.summary["home"]
     return exit_code(run.summary, home["reached"], home["tether_free"])
 
@@ -85,15 +85,15 @@ def _problem(args: argparse.Namespace) -> int:
         planning_limit=args.planning_limit or RepairPolicy.time_limit_s,
         reserve_policy=ReservePolicy(args.reserve),
     )
-    show = not args.quiet and sys.stderr.isatty()
-    on_step = show_execution(problem) if show else None
+    is_shown = not args.quiet and sys.stderr.isatty()
+    on_step = show_execution(problem) if is_shown else None
     with output_folder(args.output):
-        done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
-    if show:
+        execution = execute(problem, solution, options, surprises=surprises, on_step=on_step)
+    if is_shown:
         print(file=sys.stderr)
     with until_interrupt(None):  # the run is over; only a second Ctrl-C breaks off writing it
-        write_result(args, done)
-    return exit_code(done.summary, done.summary["home"], done.summary["tether_free"])
+        write_result(args, execution)
+    return exit_code(execution.summary, execution.summary["home"], execution.summary["tether_free"])
 
 
 def write_result(args: argparse.Namespace, done: Execution) -> None:
@@ -125,7 +125,7 @@ def checked_surprises(args: argparse.Namespace, problem: Problem) -> Surprises |
 def show_execution(
     problem: Problem, total_s: Callable[[ExecutionRow], float | None] = lambda row: None
 ) -> Callable[[ExecutionRow], None]:
-    """Return a callback that shows how a run goes, in one line.
+    """Return a callback that shows the progress of a run in one line.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the file, warn of what is tight, and return the exit code."""
+    """Write the file, warn of small margins, and return the exit code."""
     from netsp.base.files import is_mission_file
 
     return _mission(args) if is_mission_file(args.solution) else _problem(args)
@@ -120,7 +120,7 @@ def _mission(args: argparse.Namespace) -> int:
     settings = mission_files.ExportSettings(
         goal_hold_s=args.hold, speed=args.speed or mission.speed, max_waypoints=args.max_waypoints
     )
-    done = until_interrupted(
+    tour = until_interrupted(
         "exporting the tour",
         lambda: export_mission(
             mission,
@@ -132,35 +132,35 @@ def _mission(args: argparse.Namespace) -> int:
             surface=args.surface,
         ),
     )
-    row = _row(args.output, kind, done.points, settings)
+    row = _row(args.output, kind, tour.points, settings)
     print(
-        f"{args.output}: {len(done.points)} waypoints, {row['stops']} of them stops, all in the "
+        f"{args.output}: {len(tour.points)} waypoints, {row['stops']} of them stops, all in the "
         f"classes of the plan; about {row['seconds']:.0f} s at {settings.speed:g} m/s, "
-        f"stops included; longest tether {done.longest:.2f} of {mission.tether_length:g} m",
+        f"stops included; longest tether {tour.longest:.2f} of {mission.tether_length:g} m",
         file=sys.stderr,
     )
     if args.json:
-        tether = {"longest_tether": done.longest, "tether_length": mission.tether_length}
+        tether = {"longest_tether": tour.longest, "tether_length": mission.tether_length}
         json_output.tell(row | tether)
-    if mission.tether_length - done.longest < slack:
+    if mission.tether_length - tour.longest < slack:
         messages.warning(
-            f"only {mission.tether_length - done.longest:.2f} m of tether are left, less than the "
+            f"only {mission.tether_length - tour.longest:.2f} m of tether are left, less than the "
             f"margin of {slack:g}: plan with a shorter tether_length, or set another margin"
         )
-    if done.room < clearance:
+    if tour.room < clearance:
         messages.warning(
-            f"the lines between waypoints come within {done.room:.2f} m of a solid, less than the "
+            f"the lines between waypoints come within {tour.room:.2f} m of a solid, less than the "
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
     if kind in mission_files.FOR_VEHICLES:
         warn_of_clearance(args.position_error, args.current, mission.clearance, "m")
         min_depth = settings.policy.min_depth
-        shallow = sum(p.position[2] > -min_depth for p in done.points)
+        shallow = sum(p.position[2] > -min_depth for p in tour.points)
         if shallow:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {min_depth} m moved to that depth"
             )
-        if (text := bend_note(done.points, settings)) is not None:
+        if (text := bend_note(tour.points, settings)) is not None:
             messages.note(text)
         messages.note("the solids are not written: fences are upright, whatever the depth")
         messages.note("home is assumed to be at the surface above the start; do not set it by hand")

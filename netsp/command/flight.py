@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
-"""Files of a flight."""
+"""Names of the files that a flight writes."""
 
 
 def fly(
@@ -78,6 +78,7 @@ def _flown(
     is_judged: bool,
     **options: Any,
 ) -> list[Run]:
+    """Fly as `fly` does, with a clock that stops at Ctrl-C."""
     from netsp.base.files import output_folder
     from netsp.command.plot_scene import note_mission_scene, tell
     from netsp.world.mission.run_log import describe_run, write_run
@@ -85,7 +86,7 @@ def _flown(
     from netsp.world.simulator.surprises import SceneSurprises
 
     surprises = SceneSurprises.load(args.surprise) if args.surprise else None
-    show = not args.quiet and sys.stderr.isatty()
+    is_shown = not args.quiet and sys.stderr.isatty()
     runs: list[Run] = []
     with output_folder(args.output):
         scene = clock.bounded("reading the scene", mission.load_scene)
@@ -105,7 +106,7 @@ def _flown(
         if not args.quiet:
             note_mission_scene(mission, scene, field)
         for planner in planners:
-            on_step = until_stopped(clock, show_mission(mission, scene.units) if show else None)
+            on_step = until_stopped(clock, show_mission(mission, scene.units) if is_shown else None)
             fly_by = partial(
                 simulate,
                 mission,
@@ -176,7 +177,7 @@ def until_stopped(
 
 
 def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
-    """Shows how a mission goes, in one line."""
+    """Return a callback that shows the progress of a mission in one line."""
     from netsp.world.simulator.simulation_policy import SimulationPolicy
 
     count, step_s = len(mission.waypoints), SimulationPolicy().step_s
@@ -185,10 +186,10 @@ def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], No
         del planner
         if round(row.time / step_s) % 20:
             return
-        done = int(20 * row.waypoint / count)
+        n_filled = int(20 * row.waypoint / count)
         seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""
         print(
-            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  "
+            f"\r[{'#' * n_filled:.<20}] {row.time:7.1f} s  "
             f"waypoint {min(row.waypoint, count)}/{count}  "
             f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
             end="",

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.command.flight import exit_code
     from netsp.online.link.geo_frame import Frame
 
-    problem, solution, begins = _given(args)
+    problem, solution, begins = _inputs(args)
     surprises = checked_surprises(args, problem)
     if problem.units != "m":
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     return exit_code(done.summary, done.summary["home"], done.summary["tether_free"])
 
 
-def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
+def _inputs(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
     """Return problem and tour, and how the flight begins if not at the start of the tour."""
     from netsp.online.fly.resume import (
         from_guard,
@@ -110,12 +110,12 @@ def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None
             raise InputError("-o: is the folder of the resumed flight; expected another one")
     if not begins_elsewhere:
         return problem, solution, None
-    left = state or whole_tour(problem, solution)
+    remaining = state or whole_tour(problem, solution)
     if word is not None:
-        return problem, solution, from_word(problem, word, left)
+        return problem, solution, from_word(problem, word, remaining)
     if args.class_from is not None:
-        return problem, solution, from_guard(problem, args.class_from, left)
-    return problem, solution, from_record(problem, left)
+        return problem, solution, from_guard(problem, args.class_from, remaining)
+    return problem, solution, from_record(problem, remaining)
 
 
 def _next_folder(run: str) -> str:
@@ -222,14 +222,14 @@ def _flown(
 
         page = stack.enter_context(Page(problem, args.page, accepts_events=True))
         print(f"the page is {page.address}", file=sys.stderr)
-        sources.append(_from(page, complain))
+        sources.append(_events_from(page, complain))
     shows = not args.quiet and sys.stderr.isatty()
-    told = None
+    show_row = None
     if shows and predicted is not None:
-        told = show_execution(problem, FlightClock(predicted).total_s)
+        show_row = show_execution(problem, FlightClock(predicted).total_s)
     elif shows:
-        told = show_execution(problem)
-    watched = None if page is None else _watched(problem, page, args.speed)
+        show_row = show_execution(problem)
+    guard_row = None if page is None else _guard_callback(problem, page, args.speed)
     # the link last: while it is open, the vehicle counts on our heartbeats
     session = Session(UdpLink(address), frame, args.system, args.pace)
     stack.callback(session.close)
@@ -246,7 +246,7 @@ def _flown(
         for text in session.new_texts():
             if not args.quiet:
                 print(f"\nthe vehicle says: {text}", file=sys.stderr)
-        for call in (told, watched):
+        for call in (show_row, guard_row):
             if call is not None:
                 call(row)
 
@@ -274,25 +274,25 @@ def _flown(
     return done, session, clock
 
 
-def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
-    """Events that pages have sent."""
+def _events_from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
+    """Return a function that returns the events that a page has sent since the last call."""
     from netsp.online.fly.inputs import parse_event
 
-    def since() -> list[Event]:
-        found = []
+    def new_events() -> list[Event]:
+        events = []
         while True:
             try:
-                found.append(parse_event(page.events.get_nowait()))
+                events.append(parse_event(page.events.get_nowait()))
             except queue.Empty:
-                return found
+                return events
             except InputError as error:
                 complain(f"not understood: {error}")
 
-    return since
+    return new_events
 
 
-def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionRow], None]:
-    """Has a page show what a guard makes of the flight."""
+def _guard_callback(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionRow], None]:
+    """Return a callback that shows on a page what a guard reports about the flight."""
     from netsp.online.guard.guard_rehearsal import rehearse
     from netsp.online.guard.telemetry import Fix
     from netsp.online.guard.tether_guard import Guard, GuardOptions
@@ -318,7 +318,7 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
     for leg in legs_of(problem, solution):
         for k, point in enumerate(leg.path[1:], 2):
             place = (float(point[0]), float(point[1]), altitude(float(point[2])))
-            last = k == len(leg.path)
+            is_last = k == len(leg.path)
             name = "the base" if leg.goal == HOME else problem.goal_label(leg.goal)
             number += 1
             if frame.is_global:
@@ -328,7 +328,7 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
                 cells = " ".join(
                     f"{v:>{w}.2f}" for v, w in zip(frame.to_local(place), (12, 12, 10), strict=True)
                 )
-            print(f"{number:>6}  {cells}  {name if last else 'bend'}")
+            print(f"{number:>6}  {cells}  {name if is_last else 'bend'}")
 
 
 def way_home(done: Execution) -> str:

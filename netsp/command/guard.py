@@ -29,15 +29,15 @@ def run(args: argparse.Namespace) -> int:
     from netsp.online.link.geo_frame import Frame
     from netsp.world.mission.mission import Mission
 
-    kind = Mission if is_mission_file(args.site) else Problem
-    guarded_site = kind.load(args.site)
+    model = Mission if is_mission_file(args.site) else Problem
+    guarded_site = model.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)
     frame = Frame(guarded_site, args.frame)
     fixes: list[Fix] = []
     if args.replay is not None:
         from netsp.online.guard.replay import read_fixes
 
-        # all of it before anything is written: what is wrong may stand in its last line
+        # read the whole recording before writing anything: its last line may be invalid
         say = None if args.quiet else messages.note
         fixes = list(read_fixes(args.replay, frame, args.system, on_note=say))
     with ExitStack() as stack:
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
             page = stack.enter_context(Page(guard.site, args.page))
             print(f"the page is {page.address}", file=sys.stderr)
 
-        def take(report: Report) -> None:
+        def on_report(report: Report) -> None:
             counts.take(report)
             row = report.as_row() if lines is not None or page is not None else None
             if lines is not None:
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
                 say = None if args.quiet else messages.note
                 for report in replay_fixes(guard, fixes, say):
-                    take(report)
+                    on_report(report)
             else:
                 from netsp.online.guard.live import watch
 
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
                     guard,
                     frame,
                     args.link,
-                    take,
+                    on_report,
                     system=args.system,
                     state=args.state,
                     publish=args.publish,
@@ -96,15 +96,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 class ReportCounts:
-    """Reports so far, and the numbers in them."""
+    """Counts and extremes of the reports so far."""
 
     def __init__(self, site: Site, quiet: bool) -> None:
         self.site, self.quiet = site, quiet
         self.last: Report | None = None
-        self._count = self._doubt = 0
-        self._longest, self._at = 0.0, 0.0
-        self._raised: list[dict[str, Any]] = []
-        self._show = not quiet and sys.stderr.isatty()
+        self._count = self._n_in_doubt = 0
+        self._longest, self._longest_at_s = 0.0, 0.0
+        self._alarms: list[dict[str, Any]] = []
+        self._is_shown = not quiet and sys.stderr.isatty()
 
     def say(self, text: str) -> None:
         """Print a line."""
@@ -112,13 +112,13 @@ class ReportCounts:
             print(f"{self._clear()}{text}", file=sys.stderr, flush=True)
 
     def _clear(self) -> str:
-        return "\r\033[K" if self._show else ""
+        return "\r\033[K" if self._is_shown else ""
 
     def take(self, report: Report) -> None:
         """Add a report."""
         self._count += 1
         for alarm in report.raised:
-            self._raised.append(
+            self._alarms.append(
                 {
                     "t": round(report.time, 1),
                     "kind": alarm.kind,
@@ -134,11 +134,11 @@ class ReportCounts:
                 )
         if report.classes:
             self.last = report
-            self._doubt += len(report.classes) > 1
+            self._n_in_doubt += len(report.classes) > 1
             now = report.classes[0]
             if now.taut > self._longest:
-                self._longest, self._at = now.taut, report.time
-            if self._show and self._count % 5 == 0:
+                self._longest, self._longest_at_s = now.taut, report.time
+            if self._is_shown and self._count % 5 == 0:
                 units = self.site.units
                 print(
                     f"{self._clear()}{report.time:8.1f} s  tether {now.taut:.2f} of "
@@ -150,23 +150,23 @@ class ReportCounts:
 
     @property
     def reason(self) -> str:
-        """Return why nothing was claimed, as in the last alarm."""
-        estimates = [a["text"] for a in self._raised if a["kind"] == "estimate"]
+        """Reason why nothing was claimed, from the last alarm about the position estimate."""
+        estimates = [a["text"] for a in self._alarms if a["kind"] == "estimate"]
         if not estimates:
             return "no position was heard"
         return str(estimates[-1]).partition(",")[0].partition(":")[0]
 
     def summary(self) -> dict[str, Any]:
-        """Return the numbers."""
+        """Return the counts and extremes for programs."""
         last = self.last
         return {
             "site": self.site.name,
             "reports": self._count,
-            "in_doubt": self._doubt,
+            "in_doubt": self._n_in_doubt,
             "longest_tether": round(self._longest, 4),
-            "longest_at_s": round(self._at, 2),
+            "longest_at_s": round(self._longest_at_s, 2),
             "tether_length": self.site.tether_length,
-            "alarms": self._raised,
+            "alarms": self._alarms,
             "at_the_end": None
             if last is None
             else {

@@ -43,9 +43,9 @@ def run(args: argparse.Namespace) -> int:
     found: ImportedSite | None = None
     with Patience(sys.stderr, f"reading {args.site}", args.policy):
         if _is_image(args):
-            problem = _of_image(args)
+            problem = _read_image(args)
         else:
-            found = _of_map(args)
+            found = _import_map(args)
             problem, left_out, floor = found.problem, found.left_out, found.floor
             viewpoints = found.viewpoints
     from netsp.exchange.maps.goal_depths import (
@@ -57,29 +57,29 @@ def run(args: argparse.Namespace) -> int:
 
     if args.depth is not None:
         problem = with_depth(problem, args.depth)
-    why: list[str] = []
+    reasons: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
         from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
         try:
             with Patience(sys.stderr, "looking for the goals in reach", args.policy):
-                before = problem.goals
-                problem, why = keep_reachable_goals(
+                goals_before = problem.goals
+                problem, reasons = keep_reachable_goals(
                     problem, None if args.skip_unreachable else viewpoints
                 )
         except InfeasibleError:
             if found is not None:
                 show_table(args.site, found)
             raise
-        if why and found is not None:
+        if reasons and found is not None:
             found = found.keeping(problem, UNREACHED)
             problem, left_out = found.problem, found.left_out
         if args.skip_unreachable:
-            for line in why:
+            for line in reasons:
                 messages.note(f"{line}: left out")
-        elif why:
-            messages.note(f"{args.site}: {unreached_note(before, problem.goals)}")
+        elif reasons:
+            messages.note(f"{args.site}: {unreached_note(goals_before, problem.goals)}")
     if found is not None:
         show_table(args.site, found)
     print(f"{problem.name}: {problem.summary}{_extent(problem)}", file=sys.stderr)
@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
                 "obstacles": len(problem.obstacles),
                 "tether_length": problem.tether_length,
                 "clearance": problem.clearance,
-                "left_out": list(why),
+                "left_out": list(reasons),
                 "file": args.output,
                 "site": None if problem.site is None else problem.site.model_dump(mode="json"),
             }
@@ -141,13 +141,14 @@ def _is_image(args: argparse.Namespace) -> bool:
     return image
 
 
-def _of_image(args: argparse.Namespace) -> Problem:
+def _read_image(args: argparse.Namespace) -> Problem:
+    """Return the problem in an occupancy image."""
     from netsp.exchange.maps.csv_table import from_table
     from netsp.exchange.maps.occupancy import read_occupancy
 
-    for name, what in (("base", "X,Y"), ("goals", "TABLE"), ("tether", "L")):
+    for name, form in (("base", "X,Y"), ("goals", "TABLE"), ("tether", "L")):
         if getattr(args, name) is None:
-            raise InputError(f"{args.site}: an occupancy image needs --{name} {what}")
+            raise InputError(f"{args.site}: an occupancy image needs --{name} {form}")
     try:
         base = tuple(float(v) for v in args.base.split(","))
     except ValueError:
@@ -187,7 +188,8 @@ def show_table(site: str, found: ImportedSite) -> None:
             messages.note(f"{site}: {note}")
 
 
-def _of_map(args: argparse.Namespace) -> ImportedSite:
+def _import_map(args: argparse.Namespace) -> ImportedSite:
+    """Import a map with features."""
     from netsp.exchange.maps.options import SiteOptions
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.maps.site_import import import_site

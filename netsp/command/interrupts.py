@@ -1,7 +1,7 @@
 """Interrupts: Ctrl-C ends a command wherever it comes, and SIGTERM does the same.
 
-What is raised where nobody can catch it (finalizers, callbacks of weak references, hooks of a fork)
-Python reports and forgets, KeyboardInterrupt too: the work would go on as if nobody had asked.
+Python only reports an exception that is raised where nobody can catch it: in finalizers, callbacks
+of weak references and hooks of a fork. An interrupt there would be lost, and the work would go on.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ T = TypeVar("T")
 def resending_lost_interrupts(delay_s: float = 0.05) -> Iterator[None]:
     """Make SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and repeat an interrupt `delay_s`
     seconds later if it was raised where nobody can catch it."""
-    before = sys.unraisablehook
+    previous_hook = sys.unraisablehook
     hears_sigterm = (
         threading.current_thread() is threading.main_thread()
         and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
@@ -33,17 +33,17 @@ def resending_lost_interrupts(delay_s: float = 0.05) -> Iterator[None]:
 
     def hook(unraisable: Any) -> None:
         if unraisable.exc_value is None or not is_interrupt(unraisable.exc_value):
-            before(unraisable)
+            previous_hook(unraisable)
             return
-        again = threading.Timer(delay_s, _interrupt)
-        again.daemon = True
-        again.start()
+        timer = threading.Timer(delay_s, _interrupt)
+        timer.daemon = True
+        timer.start()
 
     sys.unraisablehook = hook
     try:
         yield
     finally:
-        sys.unraisablehook = before
+        sys.unraisablehook = previous_hook
         if hears_sigterm:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
@@ -61,7 +61,7 @@ def until_interrupted(doing: str, call: Callable[[], T]) -> T:
     Raises
     ------
     KeyboardInterrupt
-        It was broken off.
+        The call was broken off.
     """
     from netsp.base.errors import LimitReachedError
     from netsp.base.interrupt_signals import until_interrupt

@@ -81,41 +81,41 @@ def _check(args: argparse.Namespace, library: Library) -> int:
 
     if not args.files:
         raise InputError("FILE: expected solutions to check, got none")
-    failed, answers, kept = False, [], False
+    failed, answers, has_improved = False, [], False
     for file in args.files:
         solution = Solution.load(file)
-        found = library.compared(solution)
-        record = found.record
-        if not found.verification or found.length is None:
+        result = library.compared(solution)
+        record = result.record
+        if not result.verification or result.length is None:
             failed = True
-            why = next((c.name for c in found.verification.checks if not c.passed), "no tour")
+            why = next((c.name for c in result.verification.checks if not c.passed), "no tour")
             text = f"not verified: {why}"
-        elif record is None or found.above is None:
-            text = f"{found.length:.9g}, verified; nothing was known of this problem"
-        elif found.better:
-            text = f"{found.length:.9g}, verified, {-100 * found.above:.4f} % shorter than known"
+        elif record is None or result.above is None:
+            text = f"{result.length:.9g}, verified; nothing was known of this problem"
+        elif result.better:
+            text = f"{result.length:.9g}, verified, {-100 * result.above:.4f} % shorter than known"
         else:
             proven = ", which is proven" if record.proven else ""
             text = (
-                f"{found.length:.9g}, verified, {100 * max(found.above, 0.0):.4f} % above the "
+                f"{result.length:.9g}, verified, {100 * max(result.above, 0.0):.4f} % above the "
                 f"best known, {record.length:.9g}{proven}"
             )
-        if args.keep and found.better:
+        if args.keep and result.better:
             library.submit(solution, args.by)
-            kept = True
+            has_improved = True
         answers.append(
             {
                 "file": file,
-                "problem": found.name,
-                "verified": bool(found.verification),
-                "length": found.length,
+                "problem": result.name,
+                "verified": bool(result.verification),
+                "length": result.length,
                 "best_known": None if record is None else record.length,
-                "better": found.better,
+                "better": result.better,
             }
         )
         if not args.json:
-            print(f"{file}: {found.name}: {text}")
-    if kept:
+            print(f"{file}: {result.name}: {text}")
+    if has_improved:
         library.save()
     if args.json:
         json_output.tell({"checked": answers})
@@ -149,16 +149,18 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
             if args.output:
                 rank.append_row(args.output, row)
             if not args.quiet:
-                left = (time.monotonic() - begin) / k * (len(names) - k)
+                left_s = (time.monotonic() - begin) / k * (len(names) - k)
                 record = library.records.get(row.problem)
-                what = row.message or "no tour"
+                outcome = row.message or "no tour"
                 if row.verified and row.length is not None:
-                    what = f"{row.length:.6g}"
+                    outcome = f"{row.length:.6g}"
                     if record:
-                        what += f", {100 * (row.length / record.length - 1):.3f} % above the best"
+                        outcome += (
+                            f", {100 * (row.length / record.length - 1):.3f} % above the best"
+                        )
                 print(
-                    f"[{k}/{len(names)}] {row.problem}: {what}, {row.seconds:.1f} s; "
-                    f"{span(left)} left",
+                    f"[{k}/{len(names)}] {row.problem}: {outcome}, {row.seconds:.1f} s; "
+                    f"{span(left_s)} left",
                     file=sys.stderr,
                     flush=True,
                 )

@@ -65,7 +65,7 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
     """Run the command line; return the exit code, whatever work goes on."""
     begin_command()
     wanted: str | None = None
-    # both are None when they were closed before we began
+    # both are None if they were closed before the command began
     sys.stdout, sys.stderr = sys.stdout or _Closed(), sys.stderr or io.StringIO()
     try:
         words = _joined(sys.argv[1:] if argv is None else argv)
@@ -87,8 +87,8 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
     except SeveralErrors as error:
         for complaint in error.complaints[: policy.max_complaints]:
             messages.error(complaint)
-        if (more := len(error.complaints) - policy.max_complaints) > 0:
-            messages.error(f"and {more} more")
+        if (n_more := len(error.complaints) - policy.max_complaints) > 0:
+            messages.error(f"and {n_more} more")
         return error.exit_code
     except NetspError as error:
         messages.error(str(error))
@@ -132,20 +132,20 @@ def _preparation_messages(command: str | None, is_quiet: bool) -> Iterator[None]
 
 
 def _forget_stdout() -> None:
-    """Keep Python from complaining while it closes a stdout that takes nothing any more."""
+    """Lead a broken stdout to nowhere, so that Python can close it without an error."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Closed(io.TextIOBase):
-    """A standard output that was closed before we began."""
+    """Standard output that was closed before the command began."""
 
     def write(self, text: str) -> int:
         raise OSError(errno.EBADF, "standard output is closed")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as everything here does."""
+    """Parser that raises InputError, so that errors take one line."""
 
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message} ({self.prog} --help)")
@@ -160,13 +160,13 @@ VECTORS = ("--origin", "--base", "--current")
 
 def _joined(argv: Sequence[str]) -> list[str]:
     """Return `--origin -33,151` as `--origin=-33,151`."""
-    out: list[str] = []
+    joined: list[str] = []
     for word in argv:
-        if out and out[-1] in VECTORS and word[:1] == "-" and word[1:2].isdigit():
-            out[-1] += f"={word}"
+        if joined and joined[-1] in VECTORS and word[:1] == "-" and word[1:2].isdigit():
+            joined[-1] += f"={word}"
         else:
-            out.append(word)
-    return out
+            joined.append(word)
+    return joined
 
 
 def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
@@ -176,9 +176,9 @@ def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
     if wanted is not None and wanted not in names:
         import difflib
 
-        near = difflib.get_close_matches(wanted, names, 1)
-        meant = f"did you mean {near[0]}? " if near else ""
-        raise InputError(f"unknown command {wanted!r}; {meant}expected one of {', '.join(names)}")
+        matches = difflib.get_close_matches(wanted, names, 1)
+        hint = f"did you mean {matches[0]}? " if matches else ""
+        raise InputError(f"unknown command {wanted!r}; {hint}expected one of {', '.join(names)}")
     args, unknown = _parser({wanted}).parse_known_args(words)
     if unknown:
         raise InputError(f"unknown argument {unknown[0]!r} (netsp {wanted} --help)")
@@ -210,16 +210,16 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     )
     for group in COMMANDS.values():
         for name, command in group.items():
-            p = commands.add_parser(
+            command_parser = commands.add_parser(
                 name,
                 help=command.text,
                 description=f"{command.text[0].upper()}{command.text[1:]}.",
                 formatter_class=argparse.RawDescriptionHelpFormatter,
             )
             if name in wanted:
-                add_options(p, command.options)
-                p.epilog = f"example:\n  {command.example}"
-                p.set_defaults(declared=command)
+                add_options(command_parser, command.options)
+                command_parser.epilog = f"example:\n  {command.example}"
+                command_parser.set_defaults(declared=command)
     return parser
 
 

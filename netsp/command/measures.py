@@ -20,7 +20,7 @@ DEFINITIONS = (
 
 
 def describe_path(problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | None = None) -> str:
-    """Return all measures of one path, a line each."""
+    """Return all measures of one path, one line for each."""
     figures = measure_path(problem, path, times=times)
     m = measure(problem, figures.loop if figures.is_closed else _open_loop(figures))
     rows = [
@@ -34,7 +34,7 @@ def describe_path(problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | 
 
 
 def aligned(rows: list[tuple[str, str]]) -> str:
-    """Return names and what they stand for, a line each, in two columns."""
+    """Return names and values in two columns, one line for each pair."""
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
 
@@ -50,12 +50,12 @@ def visit_table(m: PathMeasures) -> str:
     Parameters
     ----------
     m : PathMeasures
-        The figures.
+        Measures of the path.
 
     Returns
     -------
     str
-        A line for the head and each visit.
+        Head, and one line for each visit.
     """
     lines = [
         f"{'visit':>5}  {'goal':<12} {'along':>9} {'time s':>9} {'off by':>8} {'tether':>10}  word"
@@ -114,14 +114,14 @@ def entered(problem: Problem, path: npt.ArrayLike) -> list[str]:
     Parameters
     ----------
     problem : Problem
-        With the obstacles, not grown.
+        Problem with the obstacles, which are not grown by the clearance.
     path : array_like, shape (k, 2) or (k, 3)
         The path.
 
     Returns
     -------
     list of str
-        What messages call them.
+        Names of the obstacles, as in messages.
     """
     import shapely
 

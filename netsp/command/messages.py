@@ -32,11 +32,11 @@ def warnings_in_one_line() -> Iterator[None]:
     shown_before: set[str] = set()
     with warnings.catch_warnings():
         warnings.simplefilter("always", LeftOutWarning)
-        otherwise = warnings.showwarning
+        show_other = warnings.showwarning
 
-        def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        def show(message: Warning | str, category: type[Warning], *details: Any) -> None:
             if not issubclass(category, LeftOutWarning):
-                otherwise(message, category, *rest)
+                show_other(message, category, *details)
             elif str(message) not in shown_before:
                 shown_before.add(str(message))
                 warning(str(message))

@@ -12,17 +12,19 @@ from netsp.command.command_policy import CommandPolicy
 
 
 class Patience:
-    """While the body of a `with` runs, a line now and then of how far it is: by its steps, where
-    these are counted (`netsp.base.progress`), with about the time that is left.
+    """Context manager that prints lines about the progress of its body.
+
+    A line states the steps done and the estimated time left if the body counts its steps
+    (`netsp.base.progress`), else the time so far.
 
     Parameters
     ----------
     stream : file
-        Where to.
+        Stream for the lines.
     doing : str
-        What is being done.
+        Name of the work in the lines.
     policy : CommandPolicy
-        Times of the first line and of those after it.
+        Times until the first line and between further lines.
     """
 
     def __init__(self, stream: TextIO, doing: str, policy: CommandPolicy = CommandPolicy()) -> None:
@@ -45,7 +47,7 @@ class Patience:
 
     def _step(self, done: int, total: int) -> None:
         if done < self._done or total != self._total:
-            self._since = time.monotonic()  # other steps than before
+            self._since = time.monotonic()  # another series of steps has begun
         self._done, self._total = done, total
 
     def _watch(self) -> None:
@@ -60,12 +62,12 @@ class Patience:
         now, done, total = time.monotonic(), self._done, self._total
         if not 0 < done < total:
             return f"{self._doing}: {span(now - self._begin)} so far"
-        left = (now - self._since) / done * (total - done)
-        return f"{self._doing}: {done} of {total}, about {span(left)} left"
+        left_s = (now - self._since) / done * (total - done)
+        return f"{self._doing}: {done} of {total}, about {span(left_s)} left"
 
 
 def span(seconds: float) -> str:
-    """Minutes and seconds, or hours as well."""
-    minutes, rest = divmod(round(seconds), 60)
+    """Return a duration as minutes and seconds, with hours if there are any."""
+    minutes, rest_s = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+    return f"{hours}:{minutes:02d}:{rest_s:02d}" if hours else f"{minutes}:{rest_s:02d}"

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
     with Patience(sys.stderr, f"drawing {args.output}", args.policy):
-        return _drawn(args)
+        return _draw(args)
 
 
-def _drawn(args: argparse.Namespace) -> int:
+def _draw(args: argparse.Namespace) -> int:
+    """Draw what the file holds, and return the exit code."""
     from netsp.base.files import is_mission_file
 
     if is_mission_file(args.problem):

@@ -1,4 +1,4 @@
-"""Scenes in `netsp plot`."""
+"""`netsp plot` for scenes."""
 
 from __future__ import annotations
 
@@ -67,15 +67,15 @@ def note_mission_scene(mission: Mission, scene: Scene, field: DistanceField) -> 
 
 
 def warn_of_scene(model: GeodesicTether, delta: float, remedy: str) -> None:
-    """Say it when the scene is coarser than the delta asked for, and when something in it is
-    thinner than what holds a tether for certain."""
+    """Warn if the scene is coarser than the requested delta, or if a solid is so thin that the
+    tether may slip through."""
     if model.delta > delta:
         messages.warning(
             f"delta {delta:g} is finer than the voxels of the scene: {model.delta:g} is taken"
         )
     if thin := model.warnings:
-        more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
-        messages.warning(f"{thin[0]}{more}: the tether may slip through; {remedy}")
+        others = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
+        messages.warning(f"{thin[0]}{others}: the tether may slip through; {remedy}")
 
 
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
@@ -99,7 +99,7 @@ def points_of(file: str) -> Floats:
 
 
 def check_overlap(scene: Scene, field: DistanceField, path: Floats, file: str) -> None:
-    """InputError when a path is so far from the scene that the two cannot be in the same units."""
+    """Raise InputError if a path is too far from the scene for both to be in the same units."""
     boxes = [b for s in scene.all_solids() if (b := s.shape.box()) is not None]
     if field.box is not None:
         boxes.append(field.box)
@@ -125,7 +125,7 @@ def _box(low: Floats, high: Floats) -> str:
 
 
 def tell(stage: str, fraction: float) -> None:
-    """Progress of a long build."""
+    """Show the progress of a long computation."""
     if sys.stderr.isatty():
         end = "\n" if fraction >= 1.0 else ""
         print(f"\r{stage}: {100 * fraction:.0f} %", end=end, file=sys.stderr, flush=True)

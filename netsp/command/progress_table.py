@@ -31,7 +31,7 @@ class Named(Protocol):
 
 
 class ProgressTable:
-    """Prints a row for every better tour and every new stage, and now and then for the bound."""
+    """Table with a row for every better tour and new stage, and at intervals for the bound."""
 
     def __init__(self, stream: TextIO, policy: CommandPolicy = CommandPolicy()) -> None:
         self.stream, self._policy = stream, policy
@@ -50,7 +50,7 @@ class ProgressTable:
         Parameters
         ----------
         slow
-            What is said if nothing else is for `silence_s` seconds.
+            Line to print if nothing else is printed for `silence_s` seconds.
         """
         self._slow = slow
         self._begin = time.monotonic()
@@ -61,15 +61,15 @@ class ProgressTable:
         self._print(self._slow)
 
     def __call__(self, row: Progress) -> None:
-        """Print a row of progress, if it tells anything new."""
-        news = (
+        """Print a row of progress if it is news or a row is due, else hold it back."""
+        is_news = (
             self._last is None
             or row.stage != self._last.stage
             or row.incumbent != self._last.incumbent
         )
         # the solver's own time does not count the roadmap, which the summary does
         now = time.monotonic()
-        if news or now - self._shown >= self._policy.row_interval_s:
+        if is_news or now - self._shown >= self._policy.row_interval_s:
             self._show(now - self._begin, row)
         else:
             self._held = now - self._begin, row
@@ -164,8 +164,8 @@ def summary(
 def _left_out(problem: Problem, solution: Solution, limit: int) -> str:
     """Return the line that says which legs were left out."""
     legs = [f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out]
-    more = f" and {len(legs) - limit} more" if len(legs) > limit else ""
-    named = ", ".join(legs[:limit]) + more
+    others = f" and {len(legs) - limit} more" if len(legs) > limit else ""
+    named = ", ".join(legs[:limit]) + others
     return (
         f"left out {counted(len(legs), 'leg')} whose taut path was not found ({named}); the bound "
         "holds for tours along them, too"

@@ -9,7 +9,7 @@ from netsp.base.errors import InputError
 from netsp.command.command_options import refuse
 
 PAGES = (".html", ".htm")
-"""Endings of pages."""
+"""File-name extensions of pages."""
 
 
 def run(args: argparse.Namespace) -> int:

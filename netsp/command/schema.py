@@ -15,7 +15,7 @@ FORMATS = {
     "scene-surprises": "netsp.world.simulator.surprises:SceneSurprises",
     "study": "netsp.study.compare.study:Study",
 }
-"""Format → where its model lives."""
+"""Model of each format, as `module:class`."""
 
 
 def run(args: argparse.Namespace) -> int:

@@ -62,10 +62,10 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             on_progress=stages,
         )
-    placed = Mission.from_json(read_text(args.problem)).scene
-    if args.output is not None and not Path(placed).is_absolute():
-        placed = relative_to_file(Path(args.problem).parent / placed, args.output)
-    write_mission(found.mission, placed, args.output)
+    scene_path = Mission.from_json(read_text(args.problem)).scene
+    if args.output is not None and not Path(scene_path).is_absolute():
+        scene_path = relative_to_file(Path(args.problem).parent / scene_path, args.output)
+    write_mission(found.mission, scene_path, args.output)
     if args.plot:
         draw(found, scene, args.plot)
     if not args.quiet:
@@ -157,11 +157,11 @@ def summary(
     lines.append(f"tether   longest {tour.longest_tether:.4g} of {mission.tether_length:g} {units}")
     if found.run is not None:
         s = found.run.summary
-        given = "" if found.given is None else f" ({_as_given(found)})"
+        given_flight = "" if found.given is None else f" ({_as_given(found)})"
         free = "free" if s["home"]["tether_free"] else "NOT free"
         lines.append(
             f"flown    {seconds_until_home(found.run):.1f} s until home, the tether {free}, over "
-            f"the limit for {s['exceedance_s']:.1f} s{given}"
+            f"the limit for {s['exceedance_s']:.1f} s{given_flight}"
         )
     else:
         lines.append(f"flown    not: {'interrupted' if found.interrupted else 'the time was up'}")
@@ -175,7 +175,7 @@ def summary(
         more = len(found.left_out) - limit
         lines.append(
             f"left out {named}{f' and {more} more' if more > 0 else ''}: not reached by any tether "
-            f"within the limit that was found{_perhaps(found)}"
+            f"within the limit that was found{_gap_hint(found)}"
         )
     lines += _gap_lines(found, units)
     lines.append(f"time     {seconds:.1f} s{', interrupted' if found.interrupted else ''}")
@@ -186,14 +186,14 @@ def summary(
     return "\n".join(lines)
 
 
-def _perhaps(found: SolvedMission) -> str:
+def _gap_hint(found: SolvedMission) -> str:
     """Return words for waypoints that may be left out because of a gap that the grid hides."""
     gaps, cells = found.tour.unresolved_gaps, found.gaps
     if not gaps or cells is None:
         return ""
-    more = f" or {counted(len(gaps) - 1, 'other')}" if len(gaps) > 1 else ""
+    others = f" or {counted(len(gaps) - 1, 'other')}" if len(gaps) > 1 else ""
     return (
-        f"; perhaps through the gap of {gaps[0]}{more}, which cells of {cells.cell:.3g} do not "
+        f"; perhaps through the gap of {gaps[0]}{others}, which cells of {cells.cell:.3g} do not "
         "show: give the mission a finer `cell`"
     )
 
@@ -218,6 +218,7 @@ def _gap_lines(found: SolvedMission, units: str) -> list[str]:
 
 
 def _as_given(found: SolvedMission) -> str:
+    """Return words for the flight in the order of the file."""
     from netsp.plan.space.mission_solver import seconds_until_home
 
     assert found.given is not None

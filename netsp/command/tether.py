@@ -18,7 +18,7 @@ def run(args: argparse.Namespace) -> int:
     clock = command_clock(args.time_limit)
     problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
 
-    def tell(step: Step) -> None:
+    def show_step(step: Step) -> None:
         print(
             f"tether {step.tether:.6g}: tour {step.length:.6g}, {step.status.value}",
             file=sys.stderr,
@@ -29,14 +29,14 @@ def run(args: argparse.Namespace) -> int:
         args.longest,
         time_limit=clock,
         seed=args.seed,
-        on_step=None if args.quiet else tell,
+        on_step=None if args.quiet else show_step,
     )
     print(f"{'tether from':>12} {'up to':>12} {'tour':>12} {'saves':>8}  status")
-    first = curve.steps[0].length if curve.steps else 0.0
+    first_length = curve.steps[0].length if curve.steps else 0.0
     for s in curve.steps:
         print(
             f"{s.tether:>12.6g} {s.until:>12.6g} {s.length:>12.6g} "
-            f"{100.0 * (1.0 - s.length / first):>7.2f}%  {s.status.value}"
+            f"{100.0 * (1.0 - s.length / first_length):>7.2f}%  {s.status.value}"
         )
     print(
         f"shortest sufficient tether {curve.shortest:.6f} {curve.units}, needed by "

@@ -1,4 +1,4 @@
-"""Types of command-line arguments, and the check of places to write to."""
+"""Readers of command-line arguments, and the check that files can be written."""
 
 from __future__ import annotations
 
@@ -71,10 +71,10 @@ def friction_coefficient(text: str) -> float:
 
 def shard(text: str) -> tuple[int, int]:
     """Parse I/N, part I of N parts."""
-    part, _, of = text.partition("/")
-    if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
+    part, _, total = text.partition("/")
+    if not (part.isdigit() and total.isdigit() and 1 <= int(part) <= int(total)):
         raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
-    return int(part), int(of)
+    return int(part), int(total)
 
 
 def option(text: str) -> tuple[str, str]:
@@ -97,7 +97,7 @@ def count_or_range(text: str) -> int | tuple[int, int]:
 
 
 def vector(text: str, name: str) -> tuple[float, float, float]:
-    """Three numbers, separated by commas."""
+    """Parse three numbers that are separated by commas."""
     from netsp.world.scene.field import finite_point
 
     try:
@@ -108,7 +108,7 @@ def vector(text: str, name: str) -> tuple[float, float, float]:
 
 
 def margins(text: str) -> tuple[float, float]:
-    """Least tether slack and clearance, from ``SLACK`` or ``SLACK,CLEARANCE``."""
+    """Parse the minimum tether slack and clearance: ``SLACK`` or ``SLACK,CLEARANCE``."""
     from netsp.exchange.missions.export_policy import DEFAULT_EXPORT
 
     try:
@@ -126,14 +126,14 @@ def check_writable(*paths: str, inputs: Sequence[str] = ()) -> None:
     from netsp.base.files import STANDARD
 
     paths = tuple(p for p in paths if p != STANDARD)
-    read = {os.path.realpath(p) for p in inputs}
+    input_paths = {os.path.realpath(p) for p in inputs}
     for path in paths:
-        if os.path.realpath(path) in read:
+        if os.path.realpath(path) in input_paths:
             raise InputError(f"{path}: would be overwritten, and it is an input")
-    given = [os.path.realpath(p) for p in paths if not p.startswith("/dev/")]
-    twice = [name for name in given if given.count(name) > 1]
-    if twice:
-        raise InputError(f"{twice[0]}: is named for two different files")
+    real_paths = [os.path.realpath(p) for p in paths if not p.startswith("/dev/")]
+    duplicates = [name for name in real_paths if real_paths.count(name) > 1]
+    if duplicates:
+        raise InputError(f"{duplicates[0]}: is named for two different files")
     for path in paths:
         folder = os.path.dirname(os.path.abspath(path))
         if len(os.path.basename(path).encode(errors="replace")) > 250:

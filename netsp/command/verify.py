@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.judge import verify
 
     verdict = verify(problem, solution)
-    _tell(args, verdict)
+    _print_verdict(args, verdict)
     if args.measures and solution.path and not args.quiet:
         if solution.problem.sha256 != problem.sha256:
             return EXIT_NOT_VERIFIED
@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 
-def _tell(args: argparse.Namespace, verdict: Verification) -> None:
+def _print_verdict(args: argparse.Namespace, verdict: Verification) -> None:
+    """Print a verdict in words or as JSON, unless the command is quiet."""
     if args.json:
         json_output.tell(json_output.of_verdict(verdict))
     elif not args.quiet:
@@ -98,12 +99,12 @@ def _mission(args: argparse.Namespace) -> int:
 
     mission = Mission.load(args.problem)
     verdict = until_interrupted("judging the tour", lambda: verify_mission(mission))
-    _tell(args, verdict)
+    _print_verdict(args, verdict)
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 
 PATH_ENDINGS = (".csv", ".csv.gz", ".gpx", ".geojson", ".tlog", ".bin")
-"""Endings of files that hold paths and nothing else."""
+"""File-name extensions of files that hold only paths."""
 
 
 def _is_path(file: str) -> bool:

@@ -1,4 +1,4 @@
-"""`netsp warm-up`: compiles everything ahead."""
+"""`netsp warm-up`: compile all kernels ahead of their first use."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def run(args: argparse.Namespace) -> int:
     with everything_compiled(), times.measured():
         if args.after is None:
             with _other_processes(args.jobs) if not args.part else contextlib.nullcontext():
-                _compile(_own_first(list(steps()), args.part, args.jobs), args.quiet)
+                _compile(_part_first(list(steps()), args.part, args.jobs), args.quiet)
         else:
             with alone() as is_alone:
                 if is_alone:
                     _compile_likely(args.after)
     if args.list:
-        _print(times.seconds)
+        _print_times(times.seconds)
     return 0
 
 
@@ -50,28 +50,28 @@ def _other_processes(jobs: int) -> Iterator[None]:
     These processes are silent, because the body runs all steps too and reports their errors.
     """
     command = [sys.executable, "-m", "netsp", "warm-up", "--quiet", "--jobs", str(jobs), "--part"]
-    others = [
+    processes = [
         subprocess.Popen([*command, str(part)], stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         for part in range(1, jobs)
     ]
     try:
         yield
-        for other in others:
-            other.wait()
+        for process in processes:
+            process.wait()
     finally:
-        for other in others:
-            other.terminate()
+        for process in processes:
+            process.terminate()
 
 
-def _own_first(every: list[Step], part: int, jobs: int) -> list[Step]:
-    """Return all steps, first those of one of several processes.
+def _part_first(all_steps: list[Step], part: int, jobs: int) -> list[Step]:
+    """Return all steps, first the part of one of several processes.
 
     No kernel is compiled twice: a process waits for a kernel that another one is compiling.
     """
-    return every[part::jobs] + [step for k, step in enumerate(every) if k % jobs != part]
+    return all_steps[part::jobs] + [step for k, step in enumerate(all_steps) if k % jobs != part]
 
 
-def _compile(every: list[Step], quiet: bool) -> None:
+def _compile(all_steps: list[Step], quiet: bool) -> None:
     """Run all steps and show their progress."""
     from netsp.command.compiling import PreparationPolicy
     from netsp.command.patience import span
@@ -80,14 +80,16 @@ def _compile(every: list[Step], quiet: bool) -> None:
     policy, begin = PreparationPolicy(), time.monotonic()
     printed_at = begin
     with contextlib.nullcontext() if quiet else status_line() as line:
-        for done, (name, step) in enumerate(every):
+        for done, (name, step) in enumerate(all_steps):
             now = time.monotonic()
             left = (
-                f", about {span((now - begin) / done * (len(every) - done))} left" if done else ""
+                f", about {span((now - begin) / done * (len(all_steps) - done))} left"
+                if done
+                else ""
             )
-            text = f"preparing netsp: {name} ({done + 1} of {len(every)}{left})"
+            text = f"preparing netsp: {name} ({done + 1} of {len(all_steps)}{left})"
             if line is not None:
-                line.show(f"{policy.bar(done / len(every), line.columns)} {text}")
+                line.show(f"{policy.bar(done / len(all_steps), line.columns)} {text}")
             elif not quiet and (not done or now - printed_at >= policy.every_s):
                 print(text, file=sys.stderr, flush=True)
                 printed_at = now
@@ -104,13 +106,13 @@ def _compile_likely(command: str) -> None:
             step()
 
 
-def _likely_first(every: list[Step], command: str) -> list[Step]:
+def _likely_first(all_steps: list[Step], command: str) -> list[Step]:
     """Return all steps, first those that a user of the command likely needs next."""
     words = STEP_WORDS.get(command, "solver")
-    return sorted(every, key=lambda step: words not in step[0])
+    return sorted(all_steps, key=lambda step: words not in step[0])
 
 
-def _print(seconds: dict[str, float]) -> None:
+def _print_times(seconds: dict[str, float]) -> None:
     """Print all kernels by compile time, longest first."""
     from netsp.base.compiled.kernel import all_kernels
     from netsp.command.compiling import kernel_name
@@ -137,7 +139,7 @@ def steps() -> Iterator[Step]:
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
     from netsp.online.fly.flight_rehearsal import rehearse
-    from netsp.online.guard.guard_rehearsal import rehearse as watched
+    from netsp.online.guard.guard_rehearsal import rehearse as rehearse_guard
     from netsp.plan.random_worlds import random_world
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
@@ -168,7 +170,7 @@ def steps() -> Iterator[Step]:
         partial(solve, random_world(2, goals=12, tether_length=300.0), "dp", iteration_limit=30),
     )
 
-    def rounded() -> None:
+    def compile_sparse_costs() -> None:
         graph = travel_graph(fewer)
         costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
         duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
@@ -179,10 +181,10 @@ def steps() -> Iterator[Step]:
         rows.add_above(none, np.zeros((1, 1), dtype=bool))
         rows.nearest_legs(1)
         odd = odd_numbers(graph.labels)
-        tower = ClassCovers(rows, graph.cluster, odd)
-        cells = tower.cells(())
-        tower.costs(cells)
-        tower.costs_by_parity(cells, np.array([[0, 1]]))
+        covers = ClassCovers(rows, graph.cluster, odd)
+        cells = covers.cells(())
+        covers.costs(cells)
+        covers.costs_by_parity(cells, np.array([[0, 1]]))
         for held in DeadLegs.missing(costs), rows:
             prices = Prices(costs, held, graph.cluster, [], duals)
             prices.max_increases(1.0)
@@ -192,35 +194,35 @@ def steps() -> Iterator[Step]:
         legs = rows.legs_left()
         rows.costs_of(legs[:, 0], legs[:, 1])
 
-    yield "thousands of classes", rounded
+    yield "thousands of classes", compile_sparse_costs
 
-    def covered() -> None:
+    def compile_covers() -> None:
         graph = travel_graph(random_world(3, goals=4, tether_length=200.0))
         best = solve_graph(graph, "mip")
         assert best.length is not None
         assert graph.parity_oracle is not None
         odd, paths = odd_numbers(graph.labels), graph.parity_oracle(lambda: False)
         assert paths is not None
-        stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
-        for tower in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(paths, np.inf):
-            refine_covers(tower, stops, 1.02 * best.length, Limits())
+        visited = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
+        for covers in ClassCovers(graph.costs, graph.cluster, odd), PathCovers(paths, np.inf):
+            refine_covers(covers, visited, 1.02 * best.length, Limits())
 
-    yield "covers", covered
+    yield "covers", compile_covers
 
-    def of_costs() -> None:
+    def compile_cost_matrices() -> None:
         graph = travel_graph(fewer)
         for solver in ("dp", "mip"):
             solve_graph(TravelGraph.from_costs(graph.costs, graph.cluster), solver)
 
-    yield "matrices of costs", of_costs
+    yield "matrices of costs", compile_cost_matrices
     yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
 
-    def sampled() -> None:
+    def compile_sampled_roadmap() -> None:
         # OMPL is an extra, and so few samples may miss a goal
         with contextlib.suppress(InputError, LimitReachedError):
             solve(polygons, roadmap="prm", roadmap_options={"samples": 300}, time_limit=5.0)
 
-    yield "sampled roadmap", sampled
+    yield "sampled roadmap", compile_sampled_roadmap
     yield "tours carried out", rehearse
     solids = [
         {"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
@@ -243,11 +245,11 @@ def steps() -> Iterator[Step]:
             "current": (0.1, 0, 0),
         }
     )
-    plain = mission.model_copy(update={"tether": TetherPhysics()})
+    plain_mission = mission.model_copy(update={"tether": TetherPhysics()})
     for planner, vehicle in (("predictive", "kinematic"), ("react", "bluerov2")):
         yield (
             f"missions, {planner}, {vehicle}",
-            partial(simulate, plain, planner, vehicle=vehicle, scene=scene),
+            partial(simulate, plain_mission, planner, vehicle=vehicle, scene=scene),
         )
     yield "a tether in a current", partial(simulate, mission, vehicle="bluerov2", scene=scene)
 
@@ -255,21 +257,21 @@ def steps() -> Iterator[Step]:
         "tours in space",
         partial(
             solve_mission,
-            plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
+            plain_mission.model_copy(update={"waypoints": plain_mission.waypoints[:4]}),
             scene=scene,
             time_limit=None,
         ),
     )
 
     for in_space in (False, True):
-        yield f"a guard in {'space' if in_space else 'a site'}", partial(watched, in_space)
+        yield f"a guard in {'space' if in_space else 'a site'}", partial(rehearse_guard, in_space)
 
-    def voxelled() -> None:
+    def compile_voxels() -> None:
         corners = np.array(np.meshgrid((0, 12), (0, 0.5), (0, 0.5), indexing="ij"))
         triangles = "013 032 467 475 045 051 237 276 026 064 157 173"
         faces = [tuple(map(int, corners_of)) for corners_of in triangles.split()]
-        # along the diagonal of its box, most of which is empty: with little memory only what is
-        # near surfaces is held, by kernels of its own
+        # the bar lies along the diagonal of its box, most of which is empty: with little memory
+        # the grid holds only voxels near surfaces, and uses other kernels
         turn = np.linalg.qr(np.ones((3, 1)), mode="complete")[0].T
         bar = corners.reshape(3, 8).T @ turn
         points = np.random.default_rng(1).uniform(size=(5000, 3)) * (12, 0.5, 0.5)
@@ -286,10 +288,10 @@ def steps() -> Iterator[Step]:
                 assert (grid.table is not None) == scarce
                 DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0).distance(bar)
 
-    yield "meshes and clouds", voxelled
+    yield "meshes and clouds", compile_voxels
 
-    def paper() -> None:
+    def compile_react_tether() -> None:
         model = ReactTether(scene.field(), 0.1)
         model.update(model.start((-2, 0, 0), (-1, 0, 0)), (-1, -1, 0))
 
-    yield "the paper's tether", paper
+    yield "the paper's tether", compile_react_tether
