@@ -16,14 +16,14 @@ from netsp.roadmap.tether_classes import TautTether, Tethers
 
 
 class Cursor:
-    """Answers about one version of a problem.
+    """Tethers of one version of a problem, for the page.
 
     Parameters
     ----------
     problem : Problem
-        That version.
+        The version.
     path : array_like, shape (n, 3)
-        Of its tour; empty while there is none.
+        Path of its tour; empty while there is none.
     policy : AppPolicy
         Number of classes that are shown.
     """
@@ -35,7 +35,7 @@ class Cursor:
         self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
 
     def follow(self, path: Any) -> None:
-        """Take another tour."""
+        """Replace the tour by another."""
         self._path = np.array(path, dtype=float).reshape(-1, 3)
         self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
 
@@ -57,38 +57,38 @@ class Cursor:
             a, b = self._path[:-1, :2], self._path[1:, :2]
             step = b - a
             size = np.maximum((step**2).sum(1), 1e-300)
-            share = np.clip(((np.array([x, y]) - a) * step).sum(1) / size, 0.0, 1.0)
-            near = a + share[:, None] * step
-            k = int(np.argmin(np.hypot(*(near - [x, y]).T)))
-            path_to_cursor = np.vstack([self._path[: k + 1, :2], near[k], [x, y]])
+            shares = np.clip(((np.array([x, y]) - a) * step).sum(1) / size, 0.0, 1.0)
+            nearest = a + shares[:, None] * step
+            k = int(np.argmin(np.hypot(*(nearest - [x, y]).T)))
+            path_to_cursor = np.vstack([self._path[: k + 1, :2], nearest[k], [x, y]])
             rays = self.problem.representative_points
             word = concatenate((), crossings(path_to_cursor, rays))
-        found = self.tethers.to(x, y, word)
-        if found is None and word is not None:
-            found = self.tethers.to(x, y)
-        return {"x": x, "y": y} | (_shown_tether(found) if found else {"length": None})
+        tether = self.tethers.to(x, y, word)
+        if tether is None and word is not None:
+            tether = self.tethers.to(x, y)
+        return {"x": x, "y": y} | (_shown_tether(tether) if tether else {"length": None})
 
     def classes(self, goal: int) -> dict[str, Any]:
         """Return the shortest classes of a goal, and the number of all."""
         x, y, z = self.problem.goals[goal].position
-        every = self.tethers.classes(x, y, z)
+        tethers = self.tethers.classes(x, y, z)
         return {
-            "classes": [_shown_tether(t) for t in every[: self._policy.max_drawn_classes]],
-            "count": len(every),
+            "classes": [_shown_tether(t) for t in tethers[: self._policy.max_drawn_classes]],
+            "count": len(tethers),
         }
 
     def along(self, share: float) -> dict[str, Any]:
         """Return the tether in the class that the tour has at a share of its length."""
         if len(self._path) < 2:
             return {"length": None}
-        s = min(max(share, 0.0), 1.0) * self._along[-1]
-        k = min(int(np.searchsorted(self._along, s, side="right")) - 1, len(self._path) - 2)
-        span = self._along[k + 1] - self._along[k]
-        f = (s - self._along[k]) / span if span else 0.0
-        place = (1.0 - f) * self._path[k] + f * self._path[k + 1]
+        position = min(max(share, 0.0), 1.0) * self._along[-1]
+        k = min(int(np.searchsorted(self._along, position, side="right")) - 1, len(self._path) - 2)
+        segment_length = self._along[k + 1] - self._along[k]
+        fraction = (position - self._along[k]) / segment_length if segment_length else 0.0
+        place = (1.0 - fraction) * self._path[k] + fraction * self._path[k + 1]
         walked = np.vstack([self._path[: k + 1], place])
         word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
-        found = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
+        tether = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
         figures = {
             "x": float(place[0]),
             "y": float(place[1]),
@@ -96,7 +96,7 @@ class Cursor:
             "share": share,
             "base_z": float(self.problem.base[2]),
         }
-        return figures | (_shown_tether(found) if found else {"length": None})
+        return figures | (_shown_tether(tether) if tether else {"length": None})
 
 
 def _shown_tether(tether: TautTether) -> dict[str, Any]:

@@ -24,16 +24,16 @@ def drawn_points(value: object, policy: AppPolicy = AppPolicy()) -> list[list[fl
     Raises
     ------
     InputError
-        Not a list of pairs of numbers, or too many.
+        The value is not a list of pairs of numbers, or has too many.
     """
     if not isinstance(value, list) or len(value) > policy.max_drawn_points:
         raise InputError(f"drawn: expected a list of at most {policy.max_drawn_points} points")
-    out = []
+    points = []
     for k, point in enumerate(value):
         if not isinstance(point, list) or len(point) != 2:
             raise InputError(f"drawn: point {k}: expected [x, y], got {shown(point)}")
-        out.append([checked_argument(f"drawn: point {k}", v, -1e12) for v in point])
-    return out
+        points.append([checked_argument(f"drawn: point {k}", v, -1e12) for v in point])
+    return points
 
 
 def drawn_figures(problem: Problem, points: list[list[float]]) -> dict[str, Any] | None:
@@ -103,8 +103,8 @@ def end_tether(
         Points of the line; empty if it is longer than the tether or ends in an obstacle.
     """
     x, y = points[-1]
-    found = tethers.to(x, y, tuple(figures["end_word"]), figures["end_z"])
-    return [] if found is None else [[float(x), float(y)] for x, y in found.path[:, :2]]
+    tether = tethers.to(x, y, tuple(figures["end_word"]), figures["end_z"])
+    return [] if tether is None else [[float(x), float(y)] for x, y in tether.path[:, :2]]
 
 
 def worth_of_order(
@@ -129,10 +129,10 @@ def worth_of_order(
     InputError
         The value is no such list.
     """
-    good = isinstance(value, list) and len(set(map(str, value))) == len(value)
+    has_no_repetition = isinstance(value, list) and len(set(map(str, value))) == len(value)
     if (
         not isinstance(value, list)
-        or not good
+        or not has_no_repetition
         or not all(is_index(g, len(problem.goals)) for g in value)
     ):
         raise InputError(f"order: expected numbers of goals, none twice, got {shown(value)}")
@@ -151,7 +151,7 @@ def drawn_file(problem: Problem, points: list[list[float]]) -> str:
     Raises
     ------
     InputError
-        Fewer than two distinct points.
+        The path has fewer than two distinct points.
     """
     line: Floats = np.array(points, dtype=float).reshape(-1, 2)
     if len(np.unique(line, axis=0)) < 2:

@@ -26,16 +26,16 @@ def facts(
     should_stop: Callable[[], bool] = lambda: False,
     policy: AppPolicy = AppPolicy(),
 ) -> dict[str, Any] | None:
-    """Margins and profile of a tour, and the shortest sufficient tether.
+    """Return margins and profile of a tour, and the shortest sufficient tether.
 
     Parameters
     ----------
     problem : Problem
-        What was solved.
+        Problem that was solved.
     solution : Solution
-        With a tour.
+        Solution with a tour.
     should_stop : callable
-        Asked now and then; nobody waits for an answer any more.
+        Called at each place; true if nobody waits for the answer any more.
     policy : AppPolicy
         Number of places at which the tether is measured.
 
@@ -56,15 +56,15 @@ def facts(
         tether_at_share = cursor.along(share)
         z = float(np.interp(share, cursor.shares, path[:, 2]))
         rows.append([round(share, 5), tether_at_share["length"], round(z, 4)])
-    found = None
+    tour_margins = None
     if problem.state is None:
         try:
-            found = json.loads(margins(problem, solution).to_json())
+            tour_margins = json.loads(margins(problem, solution).to_json())
         except InputError:  # found with limits of its own; the judge says more
-            found = None
+            tour_margins = None
     return {
         "sufficient": shortest_sufficient(problem),
-        "margins": found,
+        "margins": tour_margins,
         "profile": rows,
         "visits": visited,
     }

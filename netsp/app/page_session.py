@@ -33,11 +33,11 @@ class Session:
     Parameters
     ----------
     document : Document
-        What is edited.
+        Document that is edited.
     time_limit : float
         Seconds of solving for one version.
     shown : Shown, optional
-        Something that is only looked at: nothing is edited or solved then.
+        Read-only contents; nothing is edited or solved then.
     notes : sequence of str
         Notes of the import, if the document comes from a map: assumptions, changes, omissions.
     policy : AppPolicy
@@ -98,7 +98,7 @@ class Session:
         return messages
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        """Tell all pages."""
+        """Send a message to all pages."""
         text = json.dumps(message, allow_nan=False)
         for page in self.pages:
             page.put_nowait(text)
@@ -231,7 +231,7 @@ class Session:
         return self._cursor.along(share) if self._cursor else None
 
     def _space(self, share: float) -> dict[str, Any]:
-        """Solids, path and tether in space."""
+        """Return solids, path and tether in space, as a plotly figure."""
         from netsp.app.space_preview import figure
 
         answer = self._along(share) or {}
@@ -259,15 +259,15 @@ class Session:
 
     def _state(self) -> dict[str, Any]:
         document = self.document
-        wrong = document.complaint() if self.shown is None else None
+        complaint = document.complaint() if self.shown is None else None
         notes = list(self._notes.get(_source(document.data), []))
-        if self.shown is None and wrong is None:
+        if self.shown is None and complaint is None:
             notes += import_warnings(document.problem())
         return {
             "state": {
                 "version": document.version,
                 "data": document.data,
-                "error": wrong,
+                "error": complaint,
                 "undo": document.can_undo,
                 "redo": document.can_redo,
                 "notes": notes,
@@ -281,7 +281,7 @@ class Session:
         }
 
     def _changed(self) -> None:
-        """After every edit: the pages are told, and the solver begins again."""
+        """Send the edited document to all pages, and start the solver again."""
         self.tell(self._state())
         self._cursor = self.facts = None
         try:
@@ -293,7 +293,7 @@ class Session:
         self._worker.solve(self.document.version, problem.to_json())
 
     def _on_solver_message(self, answer_message: dict[str, Any]) -> None:
-        """Called in the thread that listens to the solver."""
+        """Pass on a message that the thread of the solver has received."""
         if self._loop is not None:
             with contextlib.suppress(RuntimeError):  # the server is going down
                 self._loop.call_soon_threadsafe(self._apply_solver_message, answer_message)

@@ -49,9 +49,9 @@ class Routes:
     Parameters
     ----------
     session : Session
-        What is served.
+        Session that is served.
     token : str
-        Without it nothing is served.
+        Secret that every request must state.
     port : int
         Port that the server listens on.
     """

@@ -1,4 +1,4 @@
-"""Files that come in by the page and go out by it; none but these are touched."""
+"""Files that the page uploads and offers; the server touches no others."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MAPS = (
     ".fen",
     ".ral",
 )
-"""Sites in one file; shapefiles come in several, and images with a YAML beside them."""
+"""File-name extensions of maps in one file, unlike shapefiles, and images with a YAML file."""
 
 EXPORTS = {
     "plan": "mission.plan",
@@ -41,7 +41,7 @@ EXPORTS = {
     "kml": "tour.kml",
     "csv": "tour.csv",
 }
-"""Formats in which a tour can be written, with the names offered for them."""
+"""Formats in which a tour can be written, and the file name offered for each."""
 
 
 def bare_name(name: str, policy: AppPolicy = AppPolicy()) -> str:
@@ -50,14 +50,14 @@ def bare_name(name: str, policy: AppPolicy = AppPolicy()) -> str:
     Raises
     ------
     InputError
-        Nothing is left, it is hidden, cannot be printed, or is too long.
+        The name is empty, hidden, not printable, or too long.
     """
-    last = PurePosixPath(PureWindowsPath(name).name).name
-    if not last or last.startswith(".") or not last.isprintable():
+    bare = PurePosixPath(PureWindowsPath(name).name).name
+    if not bare or bare.startswith(".") or not bare.isprintable():
         raise InputError(f"file: expected a name, got {shown(name)}")
-    if (size := len(last.encode())) > (limit := policy.max_file_name):
+    if (size := len(bare.encode())) > (limit := policy.max_file_name):
         raise InputError(f"file: expected a name of at most {limit} bytes, got {size}")
-    return last
+    return bare
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class ImportAnswers:
 
     @classmethod
     def parse(cls, given: Mapping[str, str]) -> ImportAnswers:
-        """Return the answers in the fields of a form; those without text are none.
+        """Return the answers in the fields of a form; an empty field is no answer.
 
         Parameters
         ----------
@@ -141,13 +141,13 @@ def without_options(text: str) -> str:
 def _positive(given_fields: Mapping[str, str], field: str) -> float | None:
     if field not in given_fields:
         return None
-    called = field.replace("_", " ")
+    label = field.replace("_", " ")
     try:
         value = float(given_fields[field])
     except ValueError:
         value = math.nan
     if not 0.0 < value < math.inf:
-        raise InputError(f"{called}: expected a positive number, got {shown(given_fields[field])}")
+        raise InputError(f"{label}: expected a positive number, got {shown(given_fields[field])}")
     return value
 
 
@@ -163,51 +163,53 @@ def imported(
     Parameters
     ----------
     name : str
-        Of the file; its ending says what it is.
+        Name of the file; its extension states the format.
     content : bytes
-        Of the file.
+        Contents of the file.
     tether_length : float, optional
-        Taken where a map says none.
+        Length for a map that states none, metres.
     answers : ImportAnswers, optional
-        What the user says of a map.
+        Answers of the user about a map.
     policy : AppPolicy
         Limits of the file and its name.
 
     Returns
     -------
     data : dict
-        As a problem file has it.
+        Problem, in the format of problem files.
     notes : list of str
-        What was repaired or left out.
+        Repairs and omissions, one line each.
 
     Raises
     ------
     UnansweredError
-        A map lacks what the user may say.
+        A map lacks something that the user can answer.
     InputError
-        Too large, of no kind that is read, or not valid.
+        The file is too large, of an unknown format, or not valid.
     """
-    last = bare_name(name, policy)
-    ending = Path(last).suffix.lower()
+    file_name = bare_name(name, policy)
+    extension = Path(file_name).suffix.lower()
     if len(content) > policy.max_file_bytes:
-        raise InputError(f"{last}: {len(content)} bytes; expected at most {policy.max_file_bytes}")
+        raise InputError(
+            f"{file_name}: {len(content)} bytes; expected at most {policy.max_file_bytes}"
+        )
     notes: list[str] = []
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
-        file = Path(folder) / last
+        file = Path(folder) / file_name
         file.write_bytes(content)
         try:
-            if ending == ".json" and not is_map(content):
+            if extension == ".json" and not is_map(content):
                 problem = Problem.load(file)
-            elif ending in (*MAPS, ".json"):
+            elif extension in (*MAPS, ".json"):
                 problem = _site(file, notes, tether_length, answers or ImportAnswers())
             else:
-                raise InputError(f"{last}: expected .json, {', '.join(MAPS)}")
-        except UnansweredError as error:  # the folder is ours and gone
-            whole, plain = (
+                raise InputError(f"{file_name}: expected .json, {', '.join(MAPS)}")
+        except UnansweredError as error:  # leave out the temporary folder, which is gone
+            complaints, plain = (
                 [without_options(text.replace(f"{folder}/", "")) for text in texts]
                 for texts in (error.complaints, error.plain)
             )
-            raise UnansweredError(whole, plain, error.asks) from None
+            raise UnansweredError(complaints, plain, error.asks) from None
         except InputError as error:
             raise InputError(without_options(str(error).replace(f"{folder}/", ""))) from None
     lines = [without_options(note.replace(f"{folder}/", "")) for note in notes]
@@ -222,7 +224,7 @@ def _site(
     from netsp.exchange.maps.site_import import import_site
     from netsp.roadmap.reachable_goals import UNREACHED, keep_reachable_goals, unreached_note
 
-    about = Projection.parse(answers.base, name="base") if answers.base else None
+    projection = Projection.parse(answers.base, name="base") if answers.base else None
     makes_viewpoints = answers.viewpoints is not None and answers.standoff is not None
     inspection = (
         InspectionOptions(answers.viewpoints or 1, answers.standoff or 0.0)
@@ -238,21 +240,21 @@ def _site(
         inspection=inspection,
     )
     try:
-        found = import_site(file, about, options=options)
+        site = import_site(file, projection, options=options)
     except UnansweredError as error:
         if tether_length is None or "tether" not in error.asks:
             raise
         notes.append(f"{file.name}: has no tether length: {tether_length:g} m, as before")
-        found = import_site(file, about, options=replace(options, tether=tether_length))
-    problem = found.problem
+        site = import_site(file, projection, options=replace(options, tether=tether_length))
+    problem = site.problem
     assert problem.site is not None
     in_table = set(problem.site.notes)
-    notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
-    if found.viewpoints and problem.site.cropped is not None:
-        problem, why = keep_reachable_goals(problem, found.viewpoints)
-        if why:
-            notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
-            problem = found.keeping(problem, UNREACHED).problem
+    notes += [f"{file.name}: {note}" for note in site.notes if note not in in_table]
+    if site.viewpoints and problem.site.cropped is not None:
+        problem, reasons = keep_reachable_goals(problem, site.viewpoints)
+        if reasons:
+            notes.append(f"{file.name}: {unreached_note(site.problem.goals, problem.goals)}")
+            problem = site.keeping(problem, UNREACHED).problem
     return problem
 
 
@@ -279,7 +281,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
     Parameters
     ----------
     problem : Problem
-        What was solved.
+        Problem that was solved.
     solution : Solution
         Its solution.
     kind : str
@@ -288,16 +290,17 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
     Returns
     -------
     name : str
-        That it is offered under.
+        Name under which the file is offered.
     text : str
-        What `netsp export` writes.
+        Text of the file, as `netsp export` writes it.
     notes : list of str
         Notes and warnings of `netsp export`, one line each.
 
     Raises
     ------
     InputError
-        An unknown kind, no origin; as of `netsp.exchange.missions.mission_files.export`.
+        The kind is unknown, the problem has no origin, or as
+        `netsp.exchange.missions.mission_files.export`.
     """
     from netsp.exchange.maps.goal_depths import surface_warning
     from netsp.exchange.missions.export_margins import warnings
@@ -315,15 +318,15 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
         file = Path(folder) / EXPORTS[kind]
         points = export(problem, solution, file, kind)
         settings = ExportSettings()
-        written = export_notes(problem, points, kind, settings)
-        surface = surface_warning(problem, "set one depth for all in the panel")
+        remarks = export_notes(problem, points, kind, settings)
+        depth_warning = surface_warning(problem, "set one depth for all in the panel")
         notes = [
-            *([surface] if surface is not None else []),
+            *([depth_warning] if depth_warning is not None else []),
             *warnings(
                 problem, solution, points, settings.policy.min_slack, settings.policy.min_clearance
             ),
-            *written.warnings,
-            *written.notes,
+            *remarks.warnings,
+            *remarks.notes,
         ]
         return file.name, file.read_text(encoding="utf-8"), notes
 

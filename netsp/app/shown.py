@@ -25,22 +25,22 @@ from netsp.world.scene.scene import Scene, scene_of
 
 @dataclass(frozen=True)
 class Shown:
-    """A page that cannot be edited.
+    """Contents of a page that cannot be edited.
 
     Parameters
     ----------
     data : dict
-        The problem, as its file has it.
+        Problem, in the format of problem files.
     answer : dict
-        What is told of the tour.
+        Fields of the tour for the page.
     scene : Scene
-        In space.
+        Scene for the view in space.
     solution : Solution or None
-        What was planned.
+        Planned tour.
     frames : list of dict
         The tether at moments of a run; empty for a plan.
     events : list of dict
-        time, event, and what came of it.
+        Time and event, and the response to it.
     """
 
     data: dict[str, Any]
@@ -52,8 +52,8 @@ class Shown:
 
     def facts(self) -> dict[str, Any]:
         """Return tether length and height by share of the time, as `netsp.app.facts.facts`."""
-        last = max(len(self.frames) - 1, 1)
-        rows = [[k / last, f["length"], f["z"]] for k, f in enumerate(self.frames)]
+        n_intervals = max(len(self.frames) - 1, 1)
+        rows = [[k / n_intervals, f["length"], f["z"]] for k, f in enumerate(self.frames)]
         return {"sufficient": None, "margins": None, "profile": rows, "visits": []}
 
     def problem(self) -> Problem:
@@ -76,18 +76,20 @@ def read_shown(
     InputError
         Files that cannot be read or do not belong together.
     """
-    what = open_result(source, problem_file)
+    result = open_result(source, problem_file)
     with reading_run(source):
-        if isinstance(what, Opened):
+        if isinstance(result, Opened):
             return (
-                _of_execution(what, policy) if what.run else _of_plan(what.problem, what.solution)
+                _show_execution(result, policy)
+                if result.run
+                else _show_plan(result.problem, result.solution)
             )
-        if what.run is None:
+        if result.run is None:
             raise InputError(f"{source}: is a mission; expected the folder of a flight")
-        return _of_mission(what, what.run, policy)
+        return _show_mission(result, result.run, policy)
 
 
-def _of_plan(problem: Problem, solution: Solution) -> Shown:
+def _show_plan(problem: Problem, solution: Solution) -> Shown:
     return Shown(json.loads(problem.to_json()), _answer(solution), scene_of(problem), solution)
 
 
@@ -106,13 +108,13 @@ def _answer(solution: Solution) -> dict[str, Any]:
     }
 
 
-def _of_execution(what: Opened, policy: AppPolicy) -> Shown:
+def _show_execution(result: Opened, policy: AppPolicy) -> Shown:
     """Read a tour that was carried out: its path, tethers and events."""
-    problem, solution, rows = what.problem, what.solution, what.rows
-    assert what.run is not None
+    problem, solution, rows = result.problem, result.solution, result.rows
+    assert result.run is not None
     stamps = np.array([float(r["time"]) for r in rows])
-    frames, kept = [], what.tethers or []
-    for frame in kept[:: max(1, len(kept) // policy.shown_frames)]:
+    frames, tethers = [], result.tethers or []
+    for frame in tethers[:: max(1, len(tethers) // policy.shown_frames)]:
         k = min(int(np.searchsorted(stamps, frame["time"])), len(rows) - 1)
         frames.append(_frame(np.array(frame["nodes"], dtype=float), rows[k]))
     answer = {
@@ -126,24 +128,24 @@ def _of_execution(what: Opened, policy: AppPolicy) -> Shown:
             for v in solution.tour
             if v.goal < len(problem.goals)
         ],
-        "summary": json_of(what.run / "summary.json"),
+        "summary": json_of(result.run / "summary.json"),
     }
     events = [
         {"time": r["time"], "event": r["event"], "text": f"{r['response']}: {r['reason']}"}
-        for r in rows_of(what.run / "events.csv")
+        for r in rows_of(result.run / "events.csv")
     ]
     return Shown(json.loads(problem.to_json()), answer, scene_of(problem), solution, frames, events)
 
 
-def _of_mission(what: OpenedMission, run: Path, policy: AppPolicy) -> Shown:
+def _show_mission(result: OpenedMission, run: Path, policy: AppPolicy) -> Shown:
     """Read a mission that was flown; its tether is computed again along the path."""
-    mission, scene = what.mission, what.scene
+    mission, scene = result.mission, result.scene
     rows = rows_of(run / "log.csv")
     check_log(rows, run / "log.csv")
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     world = SpaceWorld(mission, scene)
     state = world.present_tether
-    track, frames, every = (
+    track, frames, interval = (
         AnchorTrack.for_mission(mission),
         [],
         max(1, len(rows) // policy.shown_frames),
@@ -151,7 +153,7 @@ def _of_mission(what: OpenedMission, run: Path, policy: AppPolicy) -> Shown:
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))
         state = world.model.update(state, path[k], anchor)
-        if k % every == 0 or k == len(rows) - 1:
+        if k % interval == 0 or k == len(rows) - 1:
             frames.append(_frame(state.nodes, row))
     data = {
         "schema_version": 1,

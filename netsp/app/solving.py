@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from netsp.app.app_policy import AppPolicy
+from netsp.base.deprecated import renamed_parameters
 
 if TYPE_CHECKING:
     from netsp.model.solution import Solution
@@ -21,22 +22,23 @@ OnMessage = Callable[[dict[str, Any]], None]
 
 
 class Worker:
-    """Solves the latest version that it is given.
+    """Process that solves the latest version of a problem.
 
     Parameters
     ----------
-    told : callable
-        Called in a thread with what the worker says: version, stage, and a tour or an error.
+    on_message : callable
+        Called in a thread with each message: version, stage, and a tour or an error.
     time_limit : float
         Seconds for one version.
     policy : AppPolicy
         Time between two tours, and number of places at which the tether is measured.
     """
 
+    @renamed_parameters(told="on_message")
     def __init__(
-        self, told: OnMessage, time_limit: float = 60.0, policy: AppPolicy = AppPolicy()
+        self, on_message: OnMessage, time_limit: float = 60.0, policy: AppPolicy = AppPolicy()
     ) -> None:
-        self.told, self.time_limit, self._policy = told, time_limit, policy
+        self._on_message, self.time_limit, self._policy = on_message, time_limit, policy
         self._lock = threading.Lock()
         self._closed = False
         self._latest: tuple[int, str] | None = None
@@ -48,7 +50,7 @@ class Worker:
         Parameters
         ----------
         version : int
-            Its number.
+            Number of the version.
         problem : str
             Text of its problem file.
         """
@@ -56,7 +58,7 @@ class Worker:
             self._latest = version, problem
             if not self._process.is_alive():
                 self._start()
-            self._ours.send((version, problem, self.time_limit))
+            self._connection.send((version, problem, self.time_limit))
 
     def close(self) -> None:
         """End the worker."""
@@ -67,25 +69,26 @@ class Worker:
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self._ours, theirs = context.Pipe()
-        self._process = context.Process(target=work, args=(theirs, self._policy), daemon=True)
+        self._connection, worker_end = context.Pipe()
+        self._process = context.Process(target=work, args=(worker_end, self._policy), daemon=True)
         self._process.start()
-        theirs.close()
+        worker_end.close()
         threading.Thread(
-            target=self._listen, args=(self._ours,), daemon=True, name="netsp-app-solving"
+            target=self._listen, args=(self._connection,), daemon=True, name="netsp-app-solving"
         ).start()
 
     def _listen(self, connection: Connection) -> None:
         while True:
             try:
-                said = connection.recv()
+                message = connection.recv()
             except (EOFError, OSError):
                 break
-            self.told(said)
-        with self._lock:  # it died: whoever asked last is served by the next
-            if not self._closed and connection is self._ours and self._latest is not None:
+            self._on_message(message)
+        # the process died: report the version as failed, and start another process
+        with self._lock:
+            if not self._closed and connection is self._connection and self._latest is not None:
                 version, _ = self._latest
-                self.told(
+                self._on_message(
                     {
                         "version": version,
                         "stage": "failed",

@@ -1,4 +1,4 @@
-"""The same in space: solids, path and tether, turnable, as plotly draws them."""
+"""Preview in space: solids, goals, path and tether as a plotly figure."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ def script() -> Path:
 def figure(
     scene: Scene, data: dict[str, Any], path: npt.ArrayLike, tether: npt.ArrayLike = ()
 ) -> dict[str, Any]:
-    """Solids, goals, path and tether.
+    """Return solids, goals, path and tether as a plotly figure.
 
     Parameters
     ----------
     scene : Scene
         The solids.
     data : dict
-        A problem, as its file has it.
+        Problem, in the format of problem files.
     path : array_like, shape (n, 3)
-        Of the robot; may be empty.
+        Path of the robot; may be empty.
     tether : array_like, shape (m, 3)
-        May be empty.
+        Tether; may be empty.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Edited problem as its file has it, with every version; knows nothing of the web.
+"""Edited problem in the format of problem files, with every version; independent of the web.
 
 A version may break the format while somebody is at it: it is kept as it is, with what is wrong, and
 only versions that are problems are solved.
@@ -45,14 +45,14 @@ class Document:
     file : str or Path, optional
         Problem file that it is saved to; what was edited and not saved is kept beside it.
     data : mapping, optional
-        The problem as its file has it; default: the file's, or an empty map.
+        Problem, in the format of problem files; default: that of the file, or an empty map.
     policy : AppPolicy
         Number of versions that are kept. They share what did not change.
 
     Attributes
     ----------
     version : int
-        Counts all changes, going back too.
+        Number of changes so far, undo and redo included.
     """
 
     def __init__(
@@ -70,16 +70,16 @@ class Document:
                 named = {**EMPTY, "name": self.file.stem}
                 data = _read(self.file) if self.file.exists() else named
         self._versions: list[dict[str, Any]] = [dict(data)]
-        self._at = 0
+        self._index = 0
         self._merging: str | None = None
         self._saved = self._versions[0]
-        if (kept := self._kept()) is not None:
-            self._push(kept)
+        if (unsaved := self._unsaved()) is not None:
+            self._push(unsaved)
 
     @property
     def data(self) -> dict[str, Any]:
         """The present version, as a problem file has it; not to be changed."""
-        return self._versions[self._at]
+        return self._versions[self._index]
 
     @property
     def saved(self) -> bool:
@@ -92,7 +92,7 @@ class Document:
         Raises
         ------
         InputError
-            It is none; says why.
+            The version is not a problem; the message says why.
         """
         if not self.data.get("goals"):
             raise InputError("there is no goal yet")
@@ -121,7 +121,7 @@ class Document:
         Raises
         ------
         InputError
-            Not such an edit; nothing is changed.
+            The edit is none of these; nothing is changed.
         """
         if not isinstance(edit, Mapping):
             raise InputError(f"edit: expected an object, got {shown(edit)}")
@@ -131,11 +131,11 @@ class Document:
             key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
         except (TypeError, ValueError):
             raise InputError("edit: expected finite numbers") from None
-        except RecursionError:  # of copying too: it takes more of the stack than reading does
+        except RecursionError:  # also from copying, which needs a deeper stack than reading
             raise InputError("edit: nested too deeply") from None
         if key is not None and key == self._merging:
-            self._keep(data)
-            self._versions[self._at] = data
+            self._write_unsaved(data)
+            self._versions[self._index] = data
             self.version += 1
         else:
             self._push(data)
@@ -143,7 +143,7 @@ class Document:
 
     def _edited(self, edit: Mapping[str, Any]) -> dict[str, Any]:
         """Return the present version with an edit done."""
-        data = dict(self.data)  # what an edit changes is copied on the way to it
+        data = dict(self.data)  # an edit copies only the parts that it changes
         value = copy.deepcopy(edit.get("value"))
         if "set" in edit:
             _set(data, edit["set"], value)
@@ -166,20 +166,20 @@ class Document:
     @property
     def can_undo(self) -> bool:
         """True if there is an earlier version."""
-        return self._at > 0
+        return self._index > 0
 
     @property
     def can_redo(self) -> bool:
         """True if a version was undone."""
-        return self._at + 1 < len(self._versions)
+        return self._index + 1 < len(self._versions)
 
     def undo(self) -> bool:
-        """Go back one version; whether there was one."""
-        return self._go(self._at - 1)
+        """Go back one version; return whether there was one."""
+        return self._go(self._index - 1)
 
     def redo(self) -> bool:
-        """Go on to the version that was gone back from; whether there was one."""
-        return self._go(self._at + 1)
+        """Restore the version that was undone last; return whether there was one."""
+        return self._go(self._index + 1)
 
     def save(self, file: str | Path | None = None) -> Path:
         """Write the problem file.
@@ -187,67 +187,68 @@ class Document:
         Parameters
         ----------
         file : str or Path, optional
-            Its name from now on.
+            Path of the file from now on.
 
         Raises
         ------
         InputError
-            The present version is no problem, has no name of a file, or it cannot be written.
+            The present version is no problem, no file is named, or it cannot be written.
         """
         target = Path(file) if file is not None else self.file
         if target is None:
             raise InputError("save: expected the name of a file")
         text = self.problem().to_json()
         write_text(target, text)
-        self._forget()
+        self._drop_unsaved()
         self.file, self._saved = target, self.data
         return target
 
     def _push(self, data: dict[str, Any]) -> None:
-        self._keep(data)
-        del self._versions[self._at + 1 :]
+        self._write_unsaved(data)
+        del self._versions[self._index + 1 :]
         self._versions.append(data)
         del self._versions[: max(0, len(self._versions) - self._policy.max_versions)]
-        self._at = len(self._versions) - 1
+        self._index = len(self._versions) - 1
         self.version += 1
 
     def _go(self, to: int) -> bool:
         if not 0 <= to < len(self._versions):
             return False
-        self._keep(self._versions[to])
-        self._at = to
+        self._write_unsaved(self._versions[to])
+        self._index = to
         self._merging = None
         self.version += 1
         return True
 
-    def _keep(self, data: dict[str, Any]) -> None:
+    def _write_unsaved(self, data: dict[str, Any]) -> None:
         """Write a version beside the file before it becomes the present one; raise InputError, and
         change no version, if the disk refuses it."""
-        if self._aside is not None:
-            write_text(self._aside, json.dumps(data, allow_nan=False))
+        if self._unsaved_file is not None:
+            write_text(self._unsaved_file, json.dumps(data, allow_nan=False))
 
-    # what was not saved
+    # unsaved edits
 
     @property
-    def _aside(self) -> Path | None:
+    def _unsaved_file(self) -> Path | None:
         """Path at which the current version is kept until it is saved, or None."""
         return None if self.file is None else self.file.with_name(f".{self.file.name}.unsaved")
 
-    def _kept(self) -> dict[str, Any] | None:
-        aside = self._aside
-        if aside is None or not aside.exists():
+    def _unsaved(self) -> dict[str, Any] | None:
+        """Return the unsaved version, unless the file is newer; None if there is none."""
+        unsaved_file = self._unsaved_file
+        if unsaved_file is None or not unsaved_file.exists():
             return None
         if (
             self.file
             and self.file.exists()
-            and os.path.getmtime(aside) < os.path.getmtime(self.file)
+            and os.path.getmtime(unsaved_file) < os.path.getmtime(self.file)
         ):
             return None  # the file was changed by somebody else since
-        return parse_json_object(read_text(aside), str(aside))
+        return parse_json_object(read_text(unsaved_file), str(unsaved_file))
 
-    def _forget(self) -> None:
-        if self._aside is not None:
-            self._aside.unlink(missing_ok=True)
+    def _drop_unsaved(self) -> None:
+        if self._unsaved_file is not None:
+            self._unsaved_file.unlink(missing_ok=True)
 
 
 def _read(file: Path) -> dict[str, Any]:
@@ -316,7 +317,7 @@ def _delete(data: dict[str, Any], paths: object) -> None:
     if not isinstance(paths, list) or not paths:
         raise InputError(f"edit: expected paths to delete, got {shown(paths)}")
     for path in paths:
-        _item(data, path)  # all of them are there, or nothing is deleted
-    gone = {(str(name), int(k)) for name, k, *_ in paths}
-    for name in {name for name, _ in gone}:
-        data[name] = [v for k, v in enumerate(data[name]) if (name, k) not in gone]
+        _item(data, path)  # nothing is deleted unless all items exist
+    deleted = {(str(name), int(k)) for name, k, *_ in paths}
+    for name in {name for name, _ in deleted}:
+        data[name] = [v for k, v in enumerate(data[name]) if (name, k) not in deleted]

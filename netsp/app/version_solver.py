@@ -87,19 +87,19 @@ class VersionSolver:
         if result.tour is None:
             self._send(stage="done", error=result.status.value)
             return None
-        found = checked(problem, to_solution(problem, graph, result, DEFAULT_SOLVER, 0))
+        solution = checked(problem, to_solution(problem, graph, result, DEFAULT_SOLVER, 0))
         self._send(
             stage="done",
             status=result.status.value,
             length=result.length,
             **bound_message(result.status, result.length, result.bound),
-            solution=found.to_json(),
+            solution=solution.to_json(),
             **_drawn(graph, result.tour),
         )
-        known = facts(problem, found, self._connection.poll, self._policy)
-        if known is not None:
-            self._send(facts=known)
-        return found
+        tour_facts = facts(problem, solution, self._connection.poll, self._policy)
+        if tour_facts is not None:
+            self._send(facts=tour_facts)
+        return solution
 
     def _send(self, **values: Any) -> None:
         self._connection.send({"version": self._version, **values})
@@ -148,9 +148,9 @@ def out_of_reach(problem: Problem) -> dict[str, Any]:
         lengths = needed(problem)
     except InputError:  # too far apart to be measured: the error itself says which goal, and why
         return {"unreached": [], "needed": None}
-    far = [
+    unreached = [
         {"goal": k, "needed": plain(float(t))}
         for k, t in enumerate(lengths)
         if t > problem.tether_length
     ]
-    return {"unreached": far, "needed": shortest_sufficient(problem)}
+    return {"unreached": unreached, "needed": shortest_sufficient(problem)}

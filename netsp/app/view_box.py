@@ -25,19 +25,19 @@ class Frame:
     problem : Problem or str or Path
         A problem, which is edited in a file of its own, or a problem file.
     height : int
-        Of the frame, pixels.
+        Height of the frame, pixels.
 
     Attributes
     ----------
     address : str
-        Of the page.
+        Address of the page.
     file : Path
-        Of the problem; `problem` reads it.
+        Problem file; `problem` reads it.
 
     Raises
     ------
     InputError
-        No such file, or the page cannot be served.
+        There is no such file, or the page cannot be served.
 
     Examples
     --------
@@ -65,8 +65,8 @@ class Frame:
         assert self._server.stderr is not None
         for line in self._server.stderr:
             lines.append(line)
-            if found := re.search(r"http://\S+", line):
-                self.address = found.group()
+            if match := re.search(r"http://\S+", line):
+                self.address = match.group()
                 return
         self._server.wait()
         self._server.stderr.close()
