@@ -58,14 +58,14 @@ def choose(
     policy = policy or CoverPolicy()
     matrix, weights = merge_patches(sees, areas)
     needed = share * float(weights.sum())
-    taken = prune(matrix, weights, choose_greedily(matrix, weights, needed), needed)
+    chosen = prune(matrix, weights, choose_greedily(matrix, weights, needed), needed)
     bound = counting_bound(matrix, weights, needed)
-    if matrix.sum() <= policy.max_matrix_entries and not clock.is_up and bound < len(taken):
-        better, proven = solve_program(matrix, weights, needed, clock)
+    if matrix.sum() <= policy.max_matrix_entries and not clock.is_up and bound < len(chosen):
+        optimised, proven = solve_program(matrix, weights, needed, clock)
         bound = max(bound, proven)
-        if better is not None and len(better) < len(taken):
-            taken = prune(matrix, weights, better, needed)
-    return Choice(np.sort(taken), min(bound, len(taken)))
+        if optimised is not None and len(optimised) < len(chosen):
+            chosen = prune(matrix, weights, optimised, needed)
+    return Choice(np.sort(chosen), min(bound, len(chosen)))
 
 
 def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
@@ -88,32 +88,32 @@ def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
 def choose_greedily(matrix: Bools, weights: Floats, needed: float) -> Ints:
     """Choose, again and again, the viewpoint that shows most of what is not seen yet, until the
     needed area is seen."""
-    left, seen, taken = weights.copy(), 0.0, []
-    numbers = matrix.astype(float)
-    while seen < needed * (1.0 - 1e-12):
-        gains = numbers @ left
+    unseen_areas, seen_area, chosen = weights.copy(), 0.0, []
+    sees = matrix.astype(float)
+    while seen_area < needed * (1.0 - 1e-12):
+        gains = sees @ unseen_areas
         k = int(gains.argmax())
         if gains[k] <= 0.0:
             break
-        taken.append(k)
-        seen += float(gains[k])
-        left[matrix[k]] = 0.0
-    return np.array(taken, dtype=np.int64)
+        chosen.append(k)
+        seen_area += float(gains[k])
+        unseen_areas[matrix[k]] = 0.0
+    return np.array(chosen, dtype=np.int64)
 
 
 def prune(matrix: Bools, weights: Floats, taken: Ints, needed: float) -> Ints:
     """Drop viewpoints, the least useful first, as long as the others see the needed area."""
-    kept = list(taken)
-    times = matrix[kept].sum(axis=0)
-    seen = float(weights[times > 0].sum())
-    while kept:
-        alone = [float(weights[matrix[k] & (times == 1)].sum()) for k in kept]
-        weakest = int(np.argmin(alone))
-        if seen - alone[weakest] < needed * (1.0 - 1e-12):
+    remaining = list(taken)
+    n_views = matrix[remaining].sum(axis=0)
+    seen_area = float(weights[n_views > 0].sum())
+    while remaining:
+        sole_areas = [float(weights[matrix[k] & (n_views == 1)].sum()) for k in remaining]
+        weakest = int(np.argmin(sole_areas))
+        if seen_area - sole_areas[weakest] < needed * (1.0 - 1e-12):
             break
-        seen -= alone[weakest]
-        times = times - matrix[kept.pop(weakest)]
-    return np.array(kept, dtype=np.int64)
+        seen_area -= sole_areas[weakest]
+        n_views = n_views - matrix[remaining.pop(weakest)]
+    return np.array(remaining, dtype=np.int64)
 
 
 def counting_bound(matrix: Bools, weights: Floats, needed: float) -> int:
@@ -134,16 +134,16 @@ def solve_program(
     from scipy.optimize import Bounds, LinearConstraint, milp
 
     n, k = matrix.shape
-    links = sparse.hstack([sparse.csr_matrix(matrix.T.astype(float)), -sparse.eye(k)])
-    area = sparse.hstack([sparse.csr_matrix((1, n)), sparse.csr_matrix(weights / needed)])
+    link_rows = sparse.hstack([sparse.csr_matrix(matrix.T.astype(float)), -sparse.eye(k)])
+    area_row = sparse.hstack([sparse.csr_matrix((1, n)), sparse.csr_matrix(weights / needed)])
     options = {} if clock.limit is None else {"time_limit": max(clock.left, 0.1)}
     found = milp(
         np.r_[np.ones(n), np.zeros(k)],
         integrality=np.r_[np.ones(n), np.zeros(k)],
         bounds=Bounds(0.0, 1.0),
         constraints=[
-            LinearConstraint(links, 0.0, np.inf),
-            LinearConstraint(area, 1.0 - 1e-9, np.inf),
+            LinearConstraint(link_rows, 0.0, np.inf),
+            LinearConstraint(area_row, 1.0 - 1e-9, np.inf),
         ],
         options=options,
     )
@@ -152,5 +152,5 @@ def solve_program(
     if found.x is None:
         return None, bound
     chosen = np.flatnonzero(found.x[:n] > 0.5)
-    seen = float(weights[matrix[chosen].any(axis=0)].sum())
-    return (chosen if seen >= needed * (1.0 - 1e-6) else None), bound
+    seen_area = float(weights[matrix[chosen].any(axis=0)].sum())
+    return (chosen if seen_area >= needed * (1.0 - 1e-6) else None), bound

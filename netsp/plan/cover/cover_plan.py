@@ -29,7 +29,7 @@ from netsp.world.simulator.coverage import Patches, surface_patches
 from netsp.world.simulator.mission_run import mission_grid
 
 UNKNOWN_TETHER_LENGTH = 1e6
-"""Sentinel: length of a tether of which it is not known yet how long it must be, metres."""
+"""Sentinel for a tether whose required length is not known yet, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,8 @@ def cover(
     standoff : float, optional
         Distance from the surface, metres; half the camera's range by default.
     tether_length : float, optional
-        Metres; waypoints need no more. By default a tenth more than they need.
+        Length of the tether, metres; no waypoint needs more. By default a tenth more than the
+        waypoints need.
     clearance : float
         Distance that the robot keeps from all solids, metres.
     share : float
@@ -158,14 +159,14 @@ def cover(
         check_bounds(mission, scene)
         field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
-        first = base if start is None else field.free_point(start, "start")
+        start_place = base if start is None else field.free_point(start, "start")
         report("surface of the scene")
         fine = clock.bounded(
             "covering the surface with patches",
             lambda: surface_patches(scene, field, camera.patch, np.array([anchor]), inspect),
         )
         patches = coarsen(fine, camera.patch)
-        mission = mission.model_copy(update={"start": tuple(first.tolist())})
+        mission = mission.model_copy(update={"start": tuple(start_place.tolist())})
         reach = clock.bounded(
             "finding where the robot gets to",
             lambda: _Reach.build(mission, scene, field, patches, standoff, policy),
@@ -181,8 +182,8 @@ def cover(
             reach.allowed,
             policy,
         )
-        looking = clock.part(policy.search_time_share)
-        found = find_viewpoints(viewer, np.random.default_rng(seed), looking, report)
+        search_clock = clock.part(policy.search_time_share)
+        found = find_viewpoints(viewer, np.random.default_rng(seed), search_clock, report)
         if not len(found) or not found.sees.any():
             raise InputError(
                 "inspect: nothing of the surface can be seen from where the robot gets to; "
@@ -246,8 +247,8 @@ class _Reach:
     ) -> _Reach:
         """Return the region, with a grid about all places where viewpoints may be."""
         low, high = extent(scene, np.vstack([patches.centres, mission.every_place]))
-        spare = 2.0 * standoff
-        corners = np.array([low - spare, high + spare])
+        margin = 2.0 * standoff
+        corners = np.array([low - margin, high + margin])
         corner_mission = mission.model_copy(
             update={
                 "waypoints": tuple(
@@ -262,30 +263,34 @@ class _Reach:
 
     def allowed(self, places: Floats) -> Bools:
         """Return which of places (n, 3) the robot gets to, within the bounds."""
-        good = np.ones(len(places), dtype=bool)
+        is_allowed = np.ones(len(places), dtype=bool)
         if self.bounds is not None:
-            good &= (places >= self.bounds[0]).all(axis=1) & (places <= self.bounds[1]).all(axis=1)
+            is_allowed &= (places >= self.bounds[0]).all(axis=1) & (places <= self.bounds[1]).all(
+                axis=1
+            )
         anchor = np.array(self.mission.anchor)
         limit = self.policy.max_tether_share * self.mission.tether_length
-        good &= np.linalg.norm(places - anchor, axis=1) <= limit
-        inside = np.flatnonzero(good)
-        if len(inside):
-            lengths = self.tethers(places[inside])
-            good[inside] = lengths <= limit
-        return good
+        is_allowed &= np.linalg.norm(places - anchor, axis=1) <= limit
+        near = np.flatnonzero(is_allowed)
+        if len(near):
+            lengths = self.tethers(places[near])
+            is_allowed[near] = lengths <= limit
+        return is_allowed
 
     def tethers(self, places: Floats) -> Floats:
         """Return the shortest tethers (n,) to places (n, 3), metres; inf where there is none."""
         anchor = np.array(self.mission.anchor)
         tree = ShortestTree(self.grid, anchor, places)
-        out = np.full(len(places), np.inf)
+        lengths = np.full(len(places), np.inf)
         for k in range(len(places)):
             path = tree.path(k)
             if path is not None:
-                out[k] = polylines.length(path)
-                if out[k] > self.policy.max_tether_share * self.mission.tether_length:
-                    out[k] = polylines.length(pull_taut(self.field, path, 0.0, self.mission.delta))
-        return out
+                lengths[k] = polylines.length(path)
+                if lengths[k] > self.policy.max_tether_share * self.mission.tether_length:
+                    lengths[k] = polylines.length(
+                        pull_taut(self.field, path, 0.0, self.mission.delta)
+                    )
+        return lengths
 
 
 def _build_cover(
@@ -302,7 +307,7 @@ def _build_cover(
         longest = float(reach.tethers(chosen.places).max())
         length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
-    others_of = find_alternatives(found, choice.chosen, patches.areas, needed, policy)
+    alternatives_of = find_alternatives(found, choice.chosen, patches.areas, needed, policy)
     viewpoints = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
         MissionWaypoint(
@@ -310,7 +315,7 @@ def _build_cover(
             heading=v.heading,
             alternatives=tuple(_viewpoint(found, k) for k in others),
         )
-        for v, others in zip(viewpoints, others_of, strict=True)
+        for v, others in zip(viewpoints, alternatives_of, strict=True)
     )
     areas = patches.areas
     visible: Bools = np.asarray(found.sees.any(axis=0))

@@ -15,8 +15,8 @@ def find_alternatives(
     """Return the numbers of the alternatives of each chosen viewpoint.
 
     Every patch that is seen gets one owner among the chosen. A viewpoint in an owner's place loses
-    the patches of that owner that it does not see itself. Whichever alternatives are taken, no more
-    is lost than is seen beyond what is needed. Only places nearer to another chosen viewpoint
+    the patches of that owner that it does not see itself. Whichever alternatives are taken, the
+    area that is seen stays at least the needed one. Only places nearer to another chosen viewpoint
     count, because they make tours shorter.
 
     Parameters
@@ -26,28 +26,30 @@ def find_alternatives(
     needed : float
         Area that must be seen.
     """
-    out: list[list[int]] = [[] for _ in chosen]
+    alternatives: list[list[int]] = [[] for _ in chosen]
     policy = policy or CoverPolicy()
     max_count = min(policy.max_alternatives, policy.max_places // max(len(chosen), 1) - 1)
     if max_count <= 0 or len(chosen) < 2:
-        return out
+        return alternatives
     sees = found.sees[chosen]
     spare = float(areas[sees.any(axis=0)].sum()) - needed
     owner = _owners(sees)
     pairs = []
     for k, number in enumerate(chosen):
         others = found.places[np.delete(chosen, k)]
-        apart = np.linalg.norm(found.places[:, None] - others[None], axis=2).min(axis=1)
+        distances = np.linalg.norm(found.places[:, None] - others[None], axis=2).min(axis=1)
         lost = ~found.sees[:, owner == k] @ areas[owner == k]
-        able = np.flatnonzero((lost <= spare) & (apart < apart[number]))
-        pairs += [(float(lost[c]), float(apart[c]), k, int(c)) for c in able if c not in chosen]
-    given = np.zeros(len(chosen))
+        candidates = np.flatnonzero((lost <= spare) & (distances < distances[number]))
+        pairs += [
+            (float(lost[c]), float(distances[c]), k, int(c)) for c in candidates if c not in chosen
+        ]
+    reserved = np.zeros(len(chosen))
     for lost, _, k, c in sorted(pairs):
-        if len(out[k]) < max_count and lost - given[k] <= spare:
-            spare -= max(0.0, lost - given[k])
-            given[k] = max(given[k], lost)
-            out[k].append(c)
-    return out
+        if len(alternatives[k]) < max_count and lost - reserved[k] <= spare:
+            spare -= max(0.0, lost - reserved[k])
+            reserved[k] = max(reserved[k], lost)
+            alternatives[k].append(c)
+    return alternatives
 
 
 def _owners(sees: np.ndarray) -> Ints:

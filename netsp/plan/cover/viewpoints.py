@@ -87,10 +87,12 @@ class Viewer:
         in_view = np.flatnonzero(look.seen)
         sight = place - patches.centres[in_view]
         distance = np.linalg.norm(sight, axis=1)
-        square = np.einsum("ij,ij->i", sight, patches.normals[in_view])
-        good = (distance <= self.farthest) & (square >= math.cos(self.incidence) * distance - 1e-12)
+        facing = np.einsum("ij,ij->i", sight, patches.normals[in_view])
+        is_good_view = (distance <= self.farthest) & (
+            facing >= math.cos(self.incidence) * distance - 1e-12
+        )
         seen = np.zeros(len(patches.areas), dtype=bool)
-        seen[in_view[good]] = True
+        seen[in_view[is_good_view]] = True
         if len(patches.sides):
             # either side of a sheet shows it, from wherever it is looked at
             a, b = patches.sides.T
@@ -110,11 +112,11 @@ class Viewer:
         toward = self.patches.normals[targets] + offsets
         toward /= np.linalg.norm(toward, axis=1)[:, None]
         places = self.patches.centres[targets] + far[:, None] * toward
-        good = self.field.distance(places) >= self.clearance
-        places, targets = places[good], targets[good]
+        is_usable = self.field.distance(places) >= self.clearance
+        places, targets = places[is_usable], targets[is_usable]
         if len(places):
-            good = self.allowed(places)
-            places, targets = places[good], targets[good]
+            is_usable = self.allowed(places)
+            places, targets = places[is_usable], targets[is_usable]
         return places, targets
 
     def viewpoints_at(self, places: Floats, targets: Ints) -> Viewpoints:
@@ -160,11 +162,13 @@ def find_viewpoints(
     for part in np.array_split(
         hidden, max(1, math.ceil(len(hidden) / viewer.policy.patches_per_round))
     ):
-        left = part[~seen[part]]
-        if clock.is_up or not len(left):
+        still_hidden = part[~seen[part]]
+        if clock.is_up or not len(still_hidden):
             continue
         on_progress(f"looking for what is hidden, {int((~seen).sum())} patches left")
-        for place, patch in zip(*viewer.places_before(*_around(viewer, left, rng)), strict=True):
+        for place, patch in zip(
+            *viewer.places_before(*_around(viewer, still_hidden, rng)), strict=True
+        ):
             if seen[patch] or clock.is_up:
                 continue
             view = viewer.viewpoints_at(place[None], np.array([patch]))
@@ -181,14 +185,14 @@ def find_viewpoints(
 def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
     """Return other angles and distances from which to look at each patch, straight first."""
     tries = viewer.policy.views_per_hidden_patch
-    many = np.repeat(patches, tries)
-    off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
+    targets = np.repeat(patches, tries)
+    offsets = rng.normal(size=(len(targets), 3)) * rng.uniform(0.0, 1.2, len(targets))[:, None]
     min_far = viewer.policy.min_standoff_ratio * viewer.standoff
     max_far = min(viewer.farthest, 2.0 * viewer.standoff)
-    far = rng.uniform(min(min_far, max_far), max_far, len(many))
-    far[np.arange(len(many)) % tries < tries // 2] = viewer.standoff
-    off[::tries] = 0.0
-    return many, off, far
+    distances = rng.uniform(min(min_far, max_far), max_far, len(targets))
+    distances[np.arange(len(targets)) % tries < tries // 2] = viewer.standoff
+    offsets[::tries] = 0.0
+    return targets, offsets, distances
 
 
 def coarsen(patches: Patches, size: float) -> Patches:
@@ -209,10 +213,12 @@ def coarsen(patches: Patches, size: float) -> Patches:
     cells = np.floor(patches.centres / size).astype(np.int64)
     _, which = np.unique(np.column_stack([cells, facing]), axis=0, return_inverse=True)
     which = which.ravel()
-    size_of = np.bincount(which)
-    middle = np.column_stack([np.bincount(which, c) for c in patches.centres.T]) / size_of[:, None]
-    off = np.linalg.norm(patches.centres - middle[which], axis=1)
-    order = np.lexsort((off, which))
+    group_sizes = np.bincount(which)
+    middles = (
+        np.column_stack([np.bincount(which, c) for c in patches.centres.T]) / group_sizes[:, None]
+    )
+    distances = np.linalg.norm(patches.centres - middles[which], axis=1)
+    order = np.lexsort((distances, which))
     first = order[np.r_[True, np.diff(which[order]) > 0]]
     areas: Floats = np.bincount(which, patches.areas).astype(float)
     sides = patches.sides
@@ -225,11 +231,11 @@ def coarsen(patches: Patches, size: float) -> Patches:
 def spread_out(points: Floats, apart: float) -> Ints:
     """Return the numbers of points so far apart that balls of radius `apart` about them hold all
     others. Each is the one farthest from those before (Gonzalez 1985)."""
-    taken = [0]
-    far = np.linalg.norm(points - points[0], axis=1)
+    chosen = [0]
+    distances = np.linalg.norm(points - points[0], axis=1)
     while True:
-        k = int(far.argmax())
-        if far[k] <= apart:
-            return np.array(taken)
-        taken.append(k)
-        far = np.minimum(far, np.linalg.norm(points - points[k], axis=1))
+        k = int(distances.argmax())
+        if distances[k] <= apart:
+            return np.array(chosen)
+        chosen.append(k)
+        distances = np.minimum(distances, np.linalg.norm(points - points[k], axis=1))

@@ -130,11 +130,11 @@ class StateGraph:
             )
         legs_by_pair = dict[tuple[int, int], Floats]()
         self._one_way = {}
-        for v, w, path, both in legs.both_directions():
+        for v, w, path, is_two_way in legs.both_directions():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
                 legs_by_pair[pair] = path if v < w else path[::-1]
-                if not both:
+                if not is_two_way:
                     self._one_way[pair] = v < w
         self._measure_paths_home(legs_by_pair)
         self.legs = {
@@ -190,8 +190,8 @@ class StateGraph:
         count = len(self.context.mission.waypoints)
         found = {
             int(places.waypoint[s.place])
-            for s, far in zip(self.states.entries, self._home, strict=False)
-            if np.isfinite(far)
+            for s, length in zip(self.states.entries, self._home, strict=False)
+            if np.isfinite(length)
         }
         return {n for n in found if n < count}
 
@@ -240,7 +240,7 @@ class StateGraph:
     @property
     def _reached_states(self) -> list[int]:
         """Return the states that the robot gets to."""
-        return [v for v, far in enumerate(self._home) if np.isfinite(far)]
+        return [v for v, length in enumerate(self._home) if np.isfinite(length)]
 
     def solve(
         self, clock: Clock, warm_start: Sequence[int] | None = None, **options: Any
@@ -305,7 +305,7 @@ class StateGraph:
             tether within its limit and free at the end, or if the mission begins under way and its
             tether does not come free at the start.
         """
-        first: dict[int, int] = {}
+        state_of: dict[int, int] = {}
         # if the time ran out, only the first state of each waypoint has a path out
         for v, state in enumerate(self.states.entries):
             if (
@@ -316,16 +316,16 @@ class StateGraph:
         self._measure_paths_home(self.legs)
         for v in sorted(self._reached_states, key=lambda v: self._home[v]):
             waypoint = int(self.states.places.waypoint[self.states.entries[v].place])
-            if v == self.states.present or waypoint in first:
+            if v == self.states.present or waypoint in state_of:
                 continue
             if self._can_return(v):
-                first[waypoint] = v
-        if not first:
+                state_of[waypoint] = v
+        if not state_of:
             return None
         without_legs = replace(self, legs={}, _one_way={})
         # a path out through other states follows the legs of this board
         without_legs._out = [self.path_out(v) for v in range(len(self._out))]
-        driven = without_legs._drive([first[n] for n in sorted(first)])
+        driven = without_legs._drive([state_of[n] for n in sorted(state_of)])
         return driven if driven.fault is None else None
 
     def _can_return(self, v: int) -> bool:
@@ -333,8 +333,8 @@ class StateGraph:
         context, path = self.context, self._path_out(v)
         tether_out, longest = context.drive(context.start_tether, path, is_fine=True)
         tether_back, longest_back = context.drive(tether_out, path[::-1], is_fine=True)
-        free = hang_alike(tether_back, context.start_tether, context.mission.delta)
-        return free and max(longest, longest_back) <= self.states.limit
+        is_free = hang_alike(tether_back, context.start_tether, context.mission.delta)
+        return is_free and max(longest, longest_back) <= self.states.limit
 
     def drive(self, tour: Sequence[int]) -> DrivenTour:
         """Drive a tour with the tether at its beginning, in the direction in which more of its legs
@@ -359,18 +359,18 @@ class StateGraph:
     def _drive(self, tour: Sequence[int]) -> DrivenTour:
         """Drive a tour in the given direction."""
         states, context, places = self.states, self.context, self.states.places
-        tether, last = context.present_tether, -1 if states.present is None else states.present
+        tether, previous = context.present_tether, -1 if states.present is None else states.present
         visits: list[TourVisit] = []
         total, fault, first_deviation = 0.0, None, None
         delta = context.mission.delta
         word = context.word_number(tether.nodes)
         at_home = context.word_number(context.start_tether.nodes)
         for state in [*tour, -1]:
-            path = self.path(last, state)
+            path = self.path(previous, state)
             tether, longest = context.drive(tether, path, is_fine=True)
             total += polylines.length(path)
             expected = context.start_tether if state < 0 else states.entries[state].tether
-            pair = (min(last, state), max(last, state))
+            pair = (min(previous, state), max(previous, state))
             leg_word = context.word_number(path)
             if word is None or leg_word is None:
                 word = None
@@ -390,7 +390,7 @@ class StateGraph:
                 waypoint, choice = int(places.waypoint[place]), int(places.choice[place])
                 letters = () if word is None else context.words.letters(word)
                 visits.append(TourVisit(waypoint, choice, letters, tether.length, path, longest))
-            last = state
+            previous = state
         free = word == at_home and hang_alike(tether, context.start_tether, delta)
         return DrivenTour(list(tour), visits, path, total, free, fault or first_deviation)
 

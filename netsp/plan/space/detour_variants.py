@@ -60,15 +60,15 @@ def _bent_paths(
 ) -> Iterator[Floats]:
     """Yield paths with one bend, out from the straight one."""
     step = end - begin
-    far = float(np.linalg.norm(step))
-    if far < 1e-9 or max_length <= far:
+    straight_length = float(np.linalg.norm(step))
+    if straight_length < 1e-9 or max_length <= straight_length:
         return
     u, v = perpendiculars(step)
-    out = 0.5 * math.sqrt(max_length**2 - far**2)
+    max_offset = 0.5 * math.sqrt(max_length**2 - straight_length**2)
     for share in policy.bend_shares:
         for angle in np.linspace(0.0, 2.0 * math.pi, policy.n_bend_directions, endpoint=False):
-            away = share * out * (math.cos(angle) * u + math.sin(angle) * v)
-            yield np.array([begin, begin + 0.5 * step + away, end])
+            offset = share * max_offset * (math.cos(angle) * u + math.sin(angle) * v)
+            yield np.array([begin, begin + 0.5 * step + offset, end])
 
 
 def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
@@ -87,8 +87,10 @@ def _is_free(context: PlanningContext, path: Floats) -> bool:
 def _is_seen_from(context: PlanningContext, known_path: Floats, bent: Floats) -> bool:
     """Return whether one path can be pulled straight across into the other."""
     shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)[1:-1]
-    one, other = _points_at(known_path, shares), _points_at(bent, shares)
-    return all(context.field.line_of_sight(a, b) for a, b in zip(one, other, strict=True))
+    known_points, bent_points = _points_at(known_path, shares), _points_at(bent, shares)
+    return all(
+        context.field.line_of_sight(a, b) for a, b in zip(known_points, bent_points, strict=True)
+    )
 
 
 def _is_alike(a: Floats, b: Floats, delta: float) -> bool:

@@ -54,14 +54,14 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
     visits: list[TourVisit] = []
     total = 0.0
     for leg in (*legs, LegTo(-1, 0, home)):
-        writes = context.word_number(leg.path)
+        leg_word = context.word_number(leg.path)
         if (
             word is None
-            or writes is None
+            or leg_word is None
             or not keeps_clearance(context.field, leg.path, context.mission)
         ):
             return None
-        word = context.words.multiply(word, writes)
+        word = context.words.multiply(word, leg_word)
         tether, longest = context.drive(tether, leg.path, is_fine=True)
         if longest > limit:
             return None
@@ -71,6 +71,6 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
             visits.append(
                 TourVisit(leg.waypoint, leg.choice, letters, tether.length, leg.path, longest)
             )
-    free = word == context.word_number(context.start_tether.nodes)
-    free = free and hang_alike(tether, context.start_tether, context.mission.delta)
-    return DrivenTour([], visits, np.asarray(home), total, True, None) if free else None
+    is_free = word == context.word_number(context.start_tether.nodes)
+    is_free = is_free and hang_alike(tether, context.start_tether, context.mission.delta)
+    return DrivenTour([], visits, np.asarray(home), total, True, None) if is_free else None

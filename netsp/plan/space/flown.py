@@ -116,27 +116,27 @@ def words_of_flight(
 def _words_in_scene(run: Run, context: PlanningContext) -> FlownWords:
     """Return the words of a flight in a scene."""
     mission, words = run.mission, context.words
-    laid, begin = context.start_tether.nodes, context.present_tether.nodes
+    start_line, begin = context.start_tether.nodes, context.present_tether.nodes
     places = np.vstack([begin, np.array([[r.x, r.y, r.z] for r in run.log])])
-    next_one = np.array([r.waypoint for r in run.log])
-    stops = []
+    next_waypoint = np.array([r.waypoint for r in run.log])
+    visits = []
     for stop in run.summary["stops"]:
         k = int(stop["waypoint"])
-        end = len(begin) + int(np.argmax(next_one > k))
+        end = len(begin) + int(np.argmax(next_waypoint > k))
         # append the waypoint itself, because only words of paths with the same ends compare
         word, broken = words.try_word(np.vstack([places[: end + 1], mission.places[k]]))
-        stops.append((k, None if broken is not None else word))
-    word, broken = words.try_word(np.vstack([places, laid[::-1]]))
+        visits.append((k, None if broken is not None else word))
+    word, broken = words.try_word(np.vstack([places, start_line[::-1]]))
     planned = () if mission.tour is None else _planned_words(mission.tour, context)
-    return FlownWords(tuple(stops), None if broken is not None else word, words.exact, planned)
+    return FlownWords(tuple(visits), None if broken is not None else word, words.exact, planned)
 
 
 def _planned_words(tour: PlannedTour, context: PlanningContext) -> tuple[Word | None, ...]:
     """Return the words at the visits of a tour in a scene, whose letters may differ from those of
     the tour's map."""
-    walked, out = context.present_tether.nodes, list[Word | None]()
+    walked, words = context.present_tether.nodes, list[Word | None]()
     for stop, place in zip(tour.stops, context.mission.places, strict=False):
         walked = np.vstack([walked, np.array(stop.path)])
         word, broken = context.words.try_word(np.vstack([walked, place]))
-        out.append(None if broken is not None else word)
-    return tuple(out)
+        words.append(None if broken is not None else word)
+    return tuple(words)

@@ -127,8 +127,8 @@ def _is_proven(gap: float | None) -> bool:
 
 def _first_of(faults: list[str]) -> str:
     """Return the first fault, and how many more there are; empty without any."""
-    more = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
-    return f"{faults[0]}{more}" if faults else ""
+    others = f", and {len(faults) - 1} more" if len(faults) > 1 else ""
+    return f"{faults[0]}{others}" if faults else ""
 
 
 def _shown(point: Floats) -> str:
@@ -179,13 +179,15 @@ class _Judge:
         line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
         if self.context.bounds is not None:
             low, high = np.array(self.context.bounds[:3]), np.array(self.context.bounds[3:])
-            out = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
-            if len(out):
-                return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")
-        far = np.linalg.norm(line - np.array(mission.anchor), axis=1)
-        k = int(far.argmax())
-        if far[k] > mission.tether_length * (1.0 + STATED_TOLERANCE):
-            detail = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
+            outside = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
+            if len(outside):
+                return Check(
+                    name, False, f"{_shown(line[outside[0]])} is out of the scene's bounds"
+                )
+        distances = np.linalg.norm(line - np.array(mission.anchor), axis=1)
+        k = int(distances.argmax())
+        if distances[k] > mission.tether_length * (1.0 + STATED_TOLERANCE):
+            detail = f"{_shown(line[k])} is {distances[k]:.4g} m from the anchor"
             return Check(name, False, f"{detail}, the tether {mission.tether_length:g} long")
         return Check(name, True, "all paths")
 
@@ -194,9 +196,9 @@ class _Judge:
         the ends."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
         largest_gap = max(gaps, default=0.0)
-        left = len(self.mission.waypoints) - len(self.tour.stops)
+        n_left_out = len(self.mission.waypoints) - len(self.tour.stops)
         detail = counted(len(self.tour.stops), "stop")
-        detail += f", {counted(left, 'waypoint')} left out" if left else ""
+        detail += f", {counted(n_left_out, 'waypoint')} left out" if n_left_out else ""
         passed = largest_gap <= self.mission.reach
         original_numbers = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
         if len(set(original_numbers)) < len(original_numbers):
@@ -220,14 +222,14 @@ class _Judge:
         A waypoint is in reach if the tether that follows a shortest path of the robot from the
         start stays within the part that plans may use.
         """
-        mission, left = self.mission, range(len(self.tour.stops), len(self.mission.waypoints))
+        mission, left_out = self.mission, range(len(self.tour.stops), len(self.mission.waypoints))
         name = "leaves out only what is out of reach"
-        if not left:
+        if not left_out:
             return Check(name, True, "no waypoint")
         context = self.context
-        tree = ShortestTree(context.grid, np.array(mission.start), mission.places[list(left)])
+        tree = ShortestTree(context.grid, np.array(mission.start), mission.places[list(left_out)])
         limit = self.policy.tether_share * mission.tether_length - mission.delta
-        for n, k in enumerate(left):
+        for n, k in enumerate(left_out):
             path = tree.path(n)
             if path is None:
                 continue
@@ -237,29 +239,31 @@ class _Judge:
             )
             if longest <= limit:
                 return Check(name, False, f"waypoint #{k}, which takes {tether.length:.3f} m")
-        return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
+        return Check(name, True, f"{len(left_out)} of {len(mission.waypoints)} waypoints")
 
     def _check_clearance(self) -> Check:
         """Check that paths keep clear of solids."""
         line, mission = self.tour.line, self.mission
         room = min_clearance_along(self.field, line)
-        tight = [
+        tight_legs = [
             k for k, leg in enumerate(self.legs) if not keeps_clearance(self.field, leg, mission)
         ]
         free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
         detail = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
-        if room < mission.clearance and not tight:
-            near = float(self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min())
+        if room < mission.clearance and not tight_legs:
+            nearest = float(
+                self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min()
+            )
             detail += (
-                f"; a waypoint or the start is {near:.3g} m from it"
-                if near < mission.clearance
+                f"; a waypoint or the start is {nearest:.3g} m from it"
+                if nearest < mission.clearance
                 else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
             )
-        if tight:
-            detail += f", which {self._leg_name(tight[0])} does not keep within half of delta"
+        if tight_legs:
+            detail += f", which {self._leg_name(tight_legs[0])} does not keep within half of delta"
         return Check(
             "keeps clear of solids",
-            free and not tight,
+            free and not tight_legs,
             detail if free else "passes through a solid",
         )
 
@@ -278,9 +282,9 @@ class _Judge:
         )
         if words.exact != self.tour.exact:
             wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
-        certain = "" if words.exact else "; other words may be of the same class, too"
+        caveat = "" if words.exact else "; other words may be of the same class, too"
         return [
-            Check("words at the stops", not wrong, _first_of(wrong) or f"all as stated{certain}"),
+            Check("words at the stops", not wrong, _first_of(wrong) or f"all as stated{caveat}"),
             Check(
                 "empty word at the end",
                 broken is None and word == (),
@@ -294,7 +298,7 @@ class _Judge:
 
     def _check_tethers(self) -> list[Check]:
         """Check the lengths of the tether, and that it is free at home."""
-        model, laid = self.context.model, self.context.start_tether
+        model, start_tether = self.context.model, self.context.start_tether
         tether, longest, longest_leg, deviations = self.context.present_tether, 0.0, 0, []
         for k, leg in enumerate(self.legs):
             tether, longest_on_leg = self.context.drive(tether, leg, is_fine=True)
@@ -303,8 +307,8 @@ class _Judge:
             if k < len(self.tour.stops):
                 deviations += self._deviations(k, tether.length, longest_on_leg)
         # the tether at the start, led to the end of the tour, which may be `reach` away
-        as_laid = model.update(laid, tether.robot)
-        left = model.refine(tether).length - model.refine(as_laid).length
+        as_laid = model.update(start_tether, tether.robot)
+        excess = model.refine(tether).length - model.refine(as_laid).length
         limit = self.mission.tether_length
         name = "home" if longest_leg == len(self.tour.stops) else f"stop {longest_leg}"
         return [
@@ -316,21 +320,21 @@ class _Judge:
             Check("tethers as long as stated", not deviations, _first_of(deviations) or "all"),
             Check(
                 "free at home",
-                left <= PlannerPolicy().free_tolerance * self.mission.delta,
-                f"{max(left, 0.0):.3f} m longer than at the start",
+                excess <= PlannerPolicy().free_tolerance * self.mission.delta,
+                f"{max(excess, 0.0):.3f} m longer than at the start",
             ),
         ]
 
     def _deviations(self, k: int, length_at: float, longest_on_leg: float) -> list[str]:
         """Return the lengths at a visit and on the way to it that differ from the stated ones."""
-        stop, out = self.tour.stops[k], []
+        stop, deviations = self.tour.stops[k], []
         for length, stated, relation in (
             (length_at, stop.tether_length, "at"),
             (longest_on_leg, stop.longest_tether, "on the way to"),
         ):
             if abs(length - stated) > self.mission.delta + self.policy.max_length_error * stated:
-                out.append(f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}")
-        return out
+                deviations.append(f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}")
+        return deviations
 
     def _check_length(self) -> Check:
         """Check the length of the tour."""
@@ -355,14 +359,16 @@ class _Judge:
             slack = STATED_TOLERANCE * tour.length
             if bound is not None and bound > tour.length + slack:
                 faults.append(f"{name} {bound:.6g} is above the length")
-            right = relative_gap(tour.length, bound)
-            if (right is None) != (gap is None) or abs((right or 0.0) - (gap or 0.0)) > 1e-6:
-                faults.append(f"the gap of {name} is {right}, stated {gap}")
-        left = len(self.mission.waypoints) - len(tour.stops)
+            expected_gap = relative_gap(tour.length, bound)
+            if (expected_gap is None) != (gap is None) or abs(
+                (expected_gap or 0.0) - (gap or 0.0)
+            ) > 1e-6:
+                faults.append(f"the gap of {name} is {expected_gap}, stated {gap}")
+        n_left_out = len(self.mission.waypoints) - len(tour.stops)
         if tour.status is Status.OPTIMAL and not _is_proven(tour.gap_to_all):
             faults.append(f"status optimal with a gap of {tour.gap_to_all} to all tours")
-        elif tour.status is Status.OPTIMAL and left:
-            faults.append(f"status optimal with {counted(left, 'waypoint')} left out")
+        elif tour.status is Status.OPTIMAL and n_left_out:
+            faults.append(f"status optimal with {counted(n_left_out, 'waypoint')} left out")
         elif tour.status is Status.OPTIMAL_OF_STATES and not _is_proven(tour.gap):
             faults.append(f"status optimal_of_states with a gap of {tour.gap}")
         elif tour.status not in (Status.OPTIMAL, Status.OPTIMAL_OF_STATES, Status.FEASIBLE):

@@ -113,8 +113,8 @@ def measure_path(
         closed = bool(np.linalg.norm(line[0] - line[-1]) < 1e-9)
     low, high = extent(scene, line)
     if cell is None:
-        room = np.prod(high - low + 2.0 * policy.margin_cells * policy.cell)
-        cell = max(policy.cell, 1.05 * float(room / policy.words.max_cells) ** (1.0 / 3.0))
+        volume = np.prod(high - low + 2.0 * policy.margin_cells * policy.cell)
+        cell = max(policy.cell, 1.05 * float(volume / policy.words.max_cells) ** (1.0 / 3.0))
     low, high = low - policy.margin_cells * cell, high + policy.margin_cells * cell
     words = SpaceSignature.in_box(scene.field(), low, high, cell, line[0], policy=policy.words)
     word = words.word(line, closed=closed)

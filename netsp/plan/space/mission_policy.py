@@ -430,7 +430,7 @@ class DetourPolicy:
         Error of the robot's position at the bends of a path, metres. A tether must come to hang
         alike with the bends moved by this distance to either side.
     drive_steps
-        Steps of the robot in which a tether that slips off something must come to hang hang_alike,
+        Steps of the robot in which a tether that slips off something must come to hang alike,
         metres. In fine steps a tether may stay on what it slips off in coarse ones.
     long_leg
         Length of a leg from which on the steps grow in proportion, metres.

@@ -285,8 +285,12 @@ class _Incumbents:
         without_bound = (GOING_ON, AS_GIVEN, SHORT_ORDER)
         if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
             return 1.0 - self.flights.policy.min_saving
-        known = found.plan is not None and found.plan.kind == TAUT_LEGS
-        return 1.0 + self.flights.policy.bound_worth if known and best.tour.solver == PLANE else 1.0
+        has_bound = found.plan is not None and found.plan.kind == TAUT_LEGS
+        return (
+            1.0 + self.flights.policy.bound_worth
+            if has_bound and best.tour.solver == PLANE
+            else 1.0
+        )
 
     def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
         """Return whether a tour that passed the judge replaces the incumbent."""
@@ -297,9 +301,9 @@ class _Incumbents:
         if self.first is not None and not self._is_no_worse(found, self.first):
             return False
         allowed = self._max_ratio(found, best)
-        seconds, of_best = self._time_until_home_s(found), self._time_until_home_s(best)
-        if seconds is not None and of_best is not None:
-            return seconds < allowed * of_best
+        seconds, best_seconds = self._time_until_home_s(found), self._time_until_home_s(best)
+        if seconds is not None and best_seconds is not None:
+            return seconds < allowed * best_seconds
         return found.tour.length < allowed * best.tour.length
 
     def _is_no_worse(self, found: SolvedMission, first: SolvedMission) -> bool:
@@ -308,8 +312,12 @@ class _Incumbents:
             return True
         if found.tour.length > first.tour.length * (1.0 + LENGTH_ROUNDING):
             return False
-        seconds, of_first = self._time_until_home_s(found), self._time_until_home_s(first)
-        return seconds is None or of_first is None or seconds <= of_first * (1.0 + LENGTH_ROUNDING)
+        seconds, first_seconds = self._time_until_home_s(found), self._time_until_home_s(first)
+        return (
+            seconds is None
+            or first_seconds is None
+            or seconds <= first_seconds * (1.0 + LENGTH_ROUNDING)
+        )
 
 
 def solve_mission(
@@ -369,37 +377,41 @@ def solve_mission(
                     mission, clock, scene=scene, field=field, on_progress=report, policy=policy
                 )
                 mission, gaps = context.mission, context.gaps
-                laid = clock.bounded("laying the tether", lambda: context.present_tether)
-                check_tether(mission, laid.length)
+                tether = clock.bounded("laying the tether", lambda: context.present_tether)
+                check_tether(mission, tether.length)
                 flights = _Flights(mission, scene, context, clock, report, policy)
-                found = _Incumbents(flights)
-                _begin_as_given(found, clock.part(policy.given_share), seed)
+                incumbents = _Incumbents(flights)
+                _begin_as_given(incumbents, clock.part(policy.given_share), seed)
         except LimitReachedError:
             if clock.is_stopped and not (isinstance(time_limit, Clock) and time_limit.is_up):
                 raise KeyboardInterrupt from None
             raise
-        searched = _search(found, clock, options)
-        best = _add_bound(_finish(found, searched, seed), searched.bounds)
+        searched = _search(incumbents, clock, options)
+        best = _add_bound(_finish(incumbents, searched, seed), searched.bounds)
         best = replace(best, mission=with_gaps(best.mission, context))
         return replace(
-            best, given=found.given, plan=searched.plan, interrupted=clock.is_stopped, gaps=gaps
+            best,
+            given=incumbents.given,
+            plan=searched.plan,
+            interrupted=clock.is_stopped,
+            gaps=gaps,
         )
 
 
-def _finish(found: _Incumbents, searched: _SearchResult, seed: int) -> SolvedMission:
+def _finish(incumbents: _Incumbents, searched: _SearchResult, seed: int) -> SolvedMission:
     """Offer the last tours after the search, and return the incumbent, flown if there is time."""
-    if found.given is None:
-        given, _ = found.flights.fly(found.flights.mission, "the order as given")
-        found.keep_given_flight(given)
-        _offer_given_flight(found, seed)
-    _offer_going_on(found, seed)
-    if found.best is None:
+    if incumbents.given is None:
+        given, _ = incumbents.flights.fly(incumbents.flights.mission, "the order as given")
+        incumbents.keep_given_flight(given)
+        _offer_given_flight(incumbents, seed)
+    _offer_going_on(incumbents, seed)
+    if incumbents.best is None:
         raise searched.failure or LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"
         )
-    found.fly_best()
-    _offer_given_flight(found, seed)
-    return found.best
+    incumbents.fly_best()
+    _offer_given_flight(incumbents, seed)
+    return incumbents.best
 
 
 def with_gaps(mission: Mission, context: PlanningContext) -> Mission:
@@ -448,17 +460,17 @@ class _SearchResult:
     has_all_bounds: bool = False
 
 
-def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
+def _begin_as_given(incumbents: _Incumbents, flight_clock: Clock, seed: int) -> None:
     """Accept the mission as it was given, whatever the time, and fly it as long as the clock
     allows.
 
     Its tour is accepted if it passes the judge, else the tour in its order.
     """
-    flights = found.flights
+    flights = incumbents.flights
     mission, on_progress = flights.mission, flights.on_progress
     order = tuple(range(len(mission.waypoints)))
     on_progress("the order as given")
-    is_accepted = mission.tour is not None and found.accept_first(
+    is_accepted = mission.tour is not None and incumbents.accept_first(
         SolvedMission(mission, order, None, None, None)
     )
     if not is_accepted:
@@ -467,37 +479,37 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
             "driving the order as given", lambda: plan_given_order(context)
         )
         if driven is not None and driven.visits:
-            found.accept_first(_solved_from_plan(driven, AS_GIVEN, seed))
-    given, _ = flights.fly(mission, "the order as given", clock=flying)
-    found.keep_given_flight(given)
-    _offer_given_flight(found, seed)
+            incumbents.accept_first(_solved_from_plan(driven, AS_GIVEN, seed))
+    given, _ = flights.fly(mission, "the order as given", clock=flight_clock)
+    incumbents.keep_given_flight(given)
+    _offer_given_flight(incumbents, seed)
 
 
-def _offer_given_flight(found: _Incumbents, seed: int) -> None:
+def _offer_given_flight(incumbents: _Incumbents, seed: int) -> None:
     """Offer the flight of the mission as it was given as a tour, if it is home earlier than the
     incumbent."""
-    given, best, mission = found.given, found.best, found.flights.mission
+    given, best, mission = incumbents.given, incumbents.best, incumbents.flights.mission
     if given is None or not _is_good(given) or (best is not None and best.run is None):
         return
     cutoff_s = np.inf if best is None or best.run is None else seconds_until_home(best.run)
-    if seconds_until_home(given) >= cutoff_s or found.flights.clock.is_overdue:
+    if seconds_until_home(given) >= cutoff_s or incumbents.flights.clock.is_overdue:
         return
     order = tuple(range(len(mission.waypoints)))
-    context = found.flights.context
+    context = incumbents.flights.context
     flown_tour = tour_of_flight(mission, order, given, context.field, context, seed, AS_GIVEN)
     if flown_tour is None or not flown_tour.tour.stops:
         return
     if best is None:
-        found.accept_first(flown_tour)
+        incumbents.accept_first(flown_tour)
     else:
-        found.offer(flown_tour, "it as it will be written")
+        incumbents.offer(flown_tour, "it as it will be written")
 
 
-def _search(found: _Incumbents, clock: Clock, options: _SolverOptions) -> _SearchResult:
+def _search(incumbents: _Incumbents, clock: Clock, options: _SolverOptions) -> _SearchResult:
     """Offer the tours of the plane and along states and legs."""
-    flights, out = found.flights, _SearchResult()
-    if clock.is_up and found.best is not None:
-        return out  # the stages before the first plan would overrun the limit
+    flights, searched = incumbents.flights, _SearchResult()
+    if clock.is_up and incumbents.best is not None:
+        return searched  # the stages before the first plan would overrun the limit
     candidates = candidate_plans(
         flights.mission,
         scene=flights.scene,
@@ -515,31 +527,35 @@ def _search(found: _Incumbents, clock: Clock, options: _SolverOptions) -> _Searc
         return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
 
     # if the order of the file cannot be driven, the first tour comes from this search
-    needs_tour = found.best is None
+    needs_tour = incumbents.best is None
     first_tour_s = flights.policy.first_tour_s if needs_tour else 0.0
     try:
         with clock.with_min_cpu(first_tour_s):
             while (plan := next_plan()) is not None:
-                best = found.best
+                best = incumbents.best
                 if plan.kind == PLANE and best is not None and best.tour.solver == PLANE:
                     continue  # the accepted tour, for the whole tether, is at most as long
-                bound_tours = partial(_raise_bound, out, plan, flights, clock, options.seed)
+                bound_tours = partial(_raise_bound, searched, plan, flights, clock, options.seed)
                 clock.bounded("bounding all tours", bound_tours)
-                out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
+                searched.plan = (
+                    searched.plan
+                    if searched.plan is not None and plan.kind == OUT_AND_BACK
+                    else plan
+                )
                 solved = _solved_from_plan(plan, options.name, options.seed)
-                found.offer(solved, f"the tour ({plan.kind})")
-                has_tour = found.best is not None
+                incumbents.offer(solved, f"the tour ({plan.kind})")
+                has_tour = incumbents.best is not None
                 if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.is_up)):
                     break
     except (InputError, LimitReachedError) as error:
-        if found.best is None or not found.best.tour.stops:
+        if incumbents.best is None or not incumbents.best.tour.stops:
             raise
-        out.failure = error
-    return out
+        searched.failure = error
+    return searched
 
 
 def _raise_bound(
-    out: _SearchResult, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
+    searched: _SearchResult, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
 ) -> None:
     """Bound all tours to the waypoints of a plan.
 
@@ -547,20 +563,22 @@ def _raise_bound(
     between waypoints are known, by all bounds.
     """
     visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
-    before = out.bounds.get(visited)
+    before = searched.bounds.get(visited)
     if plan.kind in (PLANE, SHORT_ORDER) and before is None:
         flights.on_progress("bound on all tours by upright solids")
         places = plan.paths.places
-        some = [n for n in range(len(places)) if places.waypoint[n] in visited]
-        bound = bound_by_upright_solids(flights.mission, flights.context, some, places, part)
-    elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
+        visited_places = [n for n in range(len(places)) if places.waypoint[n] in visited]
+        bound = bound_by_upright_solids(
+            flights.mission, flights.context, visited_places, places, part
+        )
+    elif plan.kind not in (PLANE, SHORT_ORDER) and not searched.has_all_bounds:
         flights.on_progress("bound on all tours")
         bound = bound_all_tours(plan.paths, sorted(visited), part, seed)
-        out.has_all_bounds = True
+        searched.has_all_bounds = True
     else:
         return
     if bound is not None:
-        out.bounds[visited] = max(bound, before or 0.0)
+        searched.bounds[visited] = max(bound, before or 0.0)
 
 
 def _solved_from_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
@@ -579,12 +597,12 @@ def _add_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> S
     if bound is None:
         return best
     tour, mission = best.tour, best.mission
-    distance = sum(
+    shortfall = sum(
         float(np.linalg.norm(np.subtract(stop.path[-1], place)))
         for stop, place in zip(tour.stops, mission.places, strict=False)
     )
-    distance = 2.0 * distance + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
-    bound = min(tour.length, max(0.0, bound - (distance if distance > LENGTH_ROUNDING else 0.0)))
+    shortfall = 2.0 * shortfall + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
+    bound = min(tour.length, max(0.0, bound - (shortfall if shortfall > LENGTH_ROUNDING else 0.0)))
     is_complete = len(tour.stops) == len(mission.waypoints)
     proven = is_complete and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
     tour = tour.model_copy(
@@ -597,9 +615,9 @@ def _add_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> S
     return replace(best, mission=mission.model_copy(update={"tour": tour}))
 
 
-def _offer_going_on(found: _Incumbents, seed: int) -> None:
+def _offer_going_on(incumbents: _Incumbents, seed: int) -> None:
     """Offer the order by going straight on, in both directions."""
-    flights = found.flights
+    flights = incumbents.flights
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
     if clock.is_up or mission.state is not None:
         return  # going straight on begins at the start
@@ -619,19 +637,19 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
         )
     except (InputError, LimitReachedError):
         return
-    rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
+    left_out = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
     for direction, ordered_waypoints in (("forward", tour), ("in reverse", tour[::-1])):
-        order = (*ordered_waypoints, *rest)
+        order = (*ordered_waypoints, *left_out)
         waypoints = tuple(mission.waypoints[n] for n in order)
         ordered = mission.model_copy(update={"waypoints": waypoints})
-        run, slower = flights.fly(ordered, f"that order {direction}", found._cutoff_s())
+        run, slower = flights.fly(ordered, f"that order {direction}", incumbents._cutoff_s())
         if slower:
             continue
         if run is None or clock.is_overdue:
             break
         flown_tour = tour_of_flight(ordered, order, run, context.field, context, seed)
         if flown_tour is not None:
-            found.offer(flown_tour, "it as it will be written")
+            incumbents.offer(flown_tour, "it as it will be written")
 
 
 def _is_good(run: Run) -> bool:
@@ -725,8 +743,8 @@ def _planned_visits(
 def _log_of_legs(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
     """Return the log of each leg, from waypoint to waypoint and home; each has two rows at
     least."""
-    next_one = np.array([r.waypoint for r in log])
-    ends = [int(np.argmax(next_one > k)) for k in visited]
+    next_waypoint = np.array([r.waypoint for r in log])
+    ends = [int(np.argmax(next_waypoint > k)) for k in visited]
     cuts = [0, *ends, len(log) - 1]
     return [log[a : b + 1] if b > a else (log[a], log[a]) for a, b in pairwise(cuts)]
 

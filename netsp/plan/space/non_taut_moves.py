@@ -68,11 +68,11 @@ class _PartialTour:
     @property
     def legs(self) -> list[_PartialTour]:
         """Return all legs in order, each as the partial tour that it completes."""
-        out, line = [], self
-        while line.before is not None:
-            out.append(line)
-            line = line.before
-        return out[::-1]
+        tours, tour = [], self
+        while tour.before is not None:
+            tours.append(tour)
+            tour = tour.before
+        return tours[::-1]
 
 
 @dataclass
@@ -158,17 +158,17 @@ class Detours:
         """Move pieces of an order as long as that makes its tour shorter, and return the partial
         tours of the best order; `found` if no order is better."""
         worth = self.paths.context.policy.bound_worth
-        seen: set[tuple[int, ...]] = set()
+        driven_orders: set[tuple[int, ...]] = set()
         has_moved = True
         while has_moved:
             has_moved = False
             for order in self._neighbouring_orders(current, shortest, cutoff):
-                if clock.is_up or len(seen) >= self._policy.max_orders:
+                if clock.is_up or len(driven_orders) >= self._policy.max_orders:
                     break
-                if tuple(order) in seen:
+                if tuple(order) in driven_orders:
                     continue
-                seen.add(tuple(order))
-                on_progress(f"detours, {len(seen)} orders, {cutoff:.1f} m")
+                driven_orders.add(tuple(order))
+                on_progress(f"detours, {len(driven_orders)} orders, {cutoff:.1f} m")
                 stages = self._drive_order(order, cutoff, clock, current, found)
                 if stages is not None:
                     found, cutoff = stages, (1.0 - worth) * stages[-1][0].length
@@ -217,15 +217,15 @@ class Detours:
     def _detours(self, begin: Floats, end: Floats) -> Iterator[Floats]:
         """Yield paths with one bend, out in all directions from the middle of the straight path."""
         effort, step = self.paths.effort, end - begin
-        far = float(np.linalg.norm(step))
-        if far < 1e-9:
+        straight_length = float(np.linalg.norm(step))
+        if straight_length < 1e-9:
             return
         u, v = perpendiculars(step)
         for extra in effort.detours:
-            out = 0.5 * far * math.sqrt((1.0 + extra) ** 2 - 1.0)
+            offset = 0.5 * straight_length * math.sqrt((1.0 + extra) ** 2 - 1.0)
             for angle in np.linspace(0.0, 2.0 * math.pi, effort.detour_directions, endpoint=False):
-                away = out * (math.cos(angle) * u + math.sin(angle) * v)
-                yield np.array([begin, begin + 0.5 * step + away, end])
+                bend = offset * (math.cos(angle) * u + math.sin(angle) * v)
+                yield np.array([begin, begin + 0.5 * step + bend, end])
 
     def _place(self, n: int) -> Floats:
         """Return the position (3,) of a place, metres."""
@@ -236,16 +236,16 @@ class Detours:
         metres; infinite if no path is known, or if there is no time to test the lines of sight of
         places far apart."""
         count = len(self.paths.points)
-        looking = clock.part(self._policy.order_share)
-        out = np.full((count + 1, count + 1), np.inf)
+        search_clock = clock.part(self._policy.order_share)
+        lengths = np.full((count + 1, count + 1), np.inf)
         for m in range(count):
             for n in (HOME, *range(m)):
                 known = self.paths.between(n, m) if n != HOME else []
-                far = polylines.length(known[0][1]) if known else np.inf
-                if not known and not looking.is_up:
-                    far = min(map(polylines.length, self._taut_paths(n, m)), default=np.inf)
-                out[n, m] = out[m, n] = far
-        return out
+                length = polylines.length(known[0][1]) if known else np.inf
+                if not known and not search_clock.is_up:
+                    length = min(map(polylines.length, self._taut_paths(n, m)), default=np.inf)
+                lengths[n, m] = lengths[m, n] = length
+        return lengths
 
     def _order_without_tether(self, shortest: Floats, clock: Clock, seed: int) -> list[int] | None:
         """Return the places in the order of the shortest tour without a tether."""
@@ -342,19 +342,19 @@ class Detours:
         Parameters
         ----------
         rest : float
-            Least length of the legs after it, metres.
+            Minimum length of the legs after it, metres.
         cutoff : float
             Length that the whole tour must stay below, metres.
         """
         context, states, is_last = self.paths.context, self.board.states, place == HOME
-        ahead = sorted(
+        candidates = sorted(
             (tour.length + polylines.length(path), i, j)
             for i, tour in enumerate(tours)
             for j, (path, _) in enumerate(paths)
             if tour.length + polylines.length(path) + rest < cutoff
         )
         kept: list[_PartialTour] = []
-        for length, i, j in ahead:
+        for length, i, j in candidates:
             if clock.is_up or len(kept) >= (1 if is_last else self.paths.effort.detour_tethers):
                 break
             tour, (path, path_word) = tours[i], paths[j]
@@ -371,7 +371,7 @@ class Detours:
                 )
         return kept
 
-    def _tether_in_flight(self, line: _PartialTour, path: Floats, after: Tether) -> Tether | None:
+    def _tether_in_flight(self, tour: _PartialTour, path: Floats, after: Tether) -> Tether | None:
         """Return the tether of a robot in flight at the end of a leg; None if it does not hang as
         it should.
 
@@ -380,29 +380,31 @@ class Detours:
         that are farther out or in.
         """
         shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
-        away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
+        bends = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
         offsets = (
             self._policy.position_error
-            * away
-            / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+            * bends
+            / np.maximum(np.linalg.norm(bends, axis=1, keepdims=True), 1e-9)
         )
-        flown, does_slip = None, False
-        for before in (line.tether, line.in_flight):
-            flown, slipped = self._drive_finely(before, path, after, self._policy.drive_steps[0])
-            if flown is None:
+        in_flight, does_slip = None, False
+        for before in (tour.tether, tour.in_flight):
+            in_flight, slipped = self._drive_finely(
+                before, path, after, self._policy.drive_steps[0]
+            )
+            if in_flight is None:
                 return None
             does_slip = does_slip or slipped
         if not does_slip:
-            return flown
+            return in_flight
         for step, offset in product(
             self._policy.drive_steps,
             (0.0 * offsets, offsets, -offsets) if len(path) > 2 else (offsets,),
         ):
             moved_path = np.vstack([path[:1], path[1:-1] + offset, path[-1:]])
-            for before in (line.tether, line.in_flight):
+            for before in (tour.tether, tour.in_flight):
                 if self._drive_finely(before, moved_path, after, step)[0] is None:
                     return None
-        return flown
+        return in_flight
 
     def _drive_finely(
         self, before: Tether, path: Floats, after: Tether, step: float
@@ -423,20 +425,22 @@ class Detours:
         drops = -np.diff(lengths, prepend=before.length)
         return arrived, bool((drops > step + delta).any())
 
-    def _is_same(self, line: _PartialTour, tether: Tether, word: int) -> bool:
+    def _is_same(self, tour: _PartialTour, tether: Tether, word: int) -> bool:
         """Return whether the tether of a partial tour hangs like another."""
         delta = self.paths.context.mission.delta
-        return line.word == word and hang_alike(line.tether, tether, 0.25 * delta)
+        return tour.word == word and hang_alike(tour.tether, tether, 0.25 * delta)
 
     def _is_free(self, tether: Tether, word: int) -> bool:
         """Return whether a tether lies as at the start."""
         context = self.paths.context
-        same = not context.words.exact or word == context.word_number(context.start_tether.nodes)
-        return same and hang_alike(tether, context.start_tether, context.mission.delta)
+        has_same_word = not context.words.exact or word == context.word_number(
+            context.start_tether.nodes
+        )
+        return has_same_word and hang_alike(tether, context.start_tether, context.mission.delta)
 
-    def _to_driven_tour(self, line: _PartialTour) -> DrivenTour:
+    def _to_driven_tour(self, tour: _PartialTour) -> DrivenTour:
         """Return a complete partial tour as a driven tour."""
-        *legs, home = line.legs
+        *legs, home = tour.legs
         places, letters = self.paths.places, self.paths.context.words.letters
         visits = [
             TourVisit(
@@ -449,16 +453,16 @@ class Detours:
             )
             for leg in legs
         ]
-        return DrivenTour([], visits, _path(home), line.length, True, None)
+        return DrivenTour([], visits, _path(home), tour.length, True, None)
 
 
-def _shortened_path(path: Floats, short: float) -> Floats:
+def _shortened_path(path: Floats, shortening: float) -> Floats:
     """Return a path without its last metres, or half of it if it is no longer than twice that."""
     length = polylines.length(path)
-    keep = max(length - short, 0.5 * length)
+    kept_length = max(length - shortening, 0.5 * length)
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    last = int(np.searchsorted(lengths, keep, side="left"))
-    share = (keep - lengths[last - 1]) / (lengths[last] - lengths[last - 1])
+    last = int(np.searchsorted(lengths, kept_length, side="left"))
+    share = (kept_length - lengths[last - 1]) / (lengths[last] - lengths[last - 1])
     return np.vstack([path[:last], path[last - 1] + share * (path[last] - path[last - 1])])
 
 

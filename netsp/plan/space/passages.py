@@ -157,13 +157,13 @@ def find_hidden_gaps(
     free = grid.free(np.zeros(3, dtype=np.int64), shape)
     if free.all() or not free.any():
         return []
-    middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
+    middle, diagonal = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
     clock.check(SEARCHING)
     flag, steep = clock.flag, steepness(grid.field)
     box = GridBox(grid.low, grid.high, grid.cell, shape)
     # bounds of the region are those of the box; its reach and the ellipsoid hold the whole box
-    region = Region(grid.clearance, np.array([grid.low, grid.high]), middle, 2.0 * whole)
-    ends = Ends(middle, middle, 4.0 * whole)
+    region = Region(grid.clearance, np.array([grid.low, grid.high]), middle, 2.0 * diagonal)
+    ends = Ends(middle, middle, 4.0 * diagonal)
     possible = clock.interruptible(
         lambda: possibly_free(grid.field.arrays, box, region, ends, steep, 2, flag)
     )
@@ -172,11 +172,11 @@ def find_hidden_gaps(
     if layers.any():
         # the free cells on both sides of a single layer are only two cells apart, so leave them out
         apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
-        far = 2.0 * grid.cell
+        min_distance = 2.0 * grid.cell
         gaps += [
             gap
             for gap in _gaps_between(grid, free, apart, possible, policy, clock)
-            if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
+            if all(np.linalg.norm(gap.place - known.place) > min_distance for known in gaps)
             and _is_open(grid, gap, policy)
         ]
     gaps.sort(key=lambda gap: -gap.width)
@@ -435,7 +435,7 @@ class GapResolution:
 
     @property
     def as_in_tour(self) -> tuple[UnresolvedGap, ...] | None:
-        """Return the gaps that stay hidden, as in a tour's `find_hidden_gaps`."""
+        """Return the gaps that stay hidden, as in a tour's `unresolved_gaps`."""
         if self.left is None:
             return None
         return tuple(
@@ -497,9 +497,15 @@ def resolve_gaps(
         if cell is None:
             return GapResolution(mission, box[2], (), tuple(gaps))
         finer = GapGrid.in_box(field, box_of(cell), mission.clearance, min_room_ratio)
-        left = find_hidden_gaps(finer, policy, searching)
+        still_hidden = find_hidden_gaps(finer, policy, searching)
     except LimitReachedError:
         return GapResolution(mission, box[2], (), tuple(gaps))
-    far = 2.0 * grid.cell
-    shown = [g for g in gaps if all(np.linalg.norm(g.place - k.place) > far for k in left)]
-    return GapResolution(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))
+    min_distance = 2.0 * grid.cell
+    shown = [
+        g
+        for g in gaps
+        if all(np.linalg.norm(g.place - k.place) > min_distance for k in still_hidden)
+    ]
+    return GapResolution(
+        mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(still_hidden)
+    )

@@ -84,8 +84,8 @@ def bound_all_tours(
         clock.part(policy.upright_share),
     )
     legs = LegBounds(robot_paths, place_numbers, potential, policy)
-    of_robot = _bound_without_tether(legs, clock, seed)
-    return max(of_robot or 0.0, upright or 0.0) or None
+    without_tether = _bound_without_tether(legs, clock, seed)
+    return max(without_tether or 0.0, upright or 0.0) or None
 
 
 @dataclass
@@ -149,9 +149,9 @@ class LegBounds:
             if is_straight_clear(context.field, a, b, context.mission.clearance):
                 self.final[u, v] = self.final[v, u] = True
                 return False
-        known = self._known_length(u, v)
+        known_length = self._known_length(u, v)
         farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
-        longest = known if math.isfinite(known) else farthest
+        longest = known_length if math.isfinite(known_length) else farthest
         level = int(self._level[u, v]) + 1
         cells = cells_at_level(level, self.potential)
         if self.policy.cell_s * cells > clock.left:

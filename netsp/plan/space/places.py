@@ -57,20 +57,20 @@ class Places:
             points.append(mission.state.position)
             waypoint.append(len(mission.waypoints))
             choice.append(0)
-        out = cls(np.array(points), np.array(waypoint), np.array(choice), present)
-        room = field.distance(out.points)
-        tight = np.flatnonzero((room < DIP_RATIO * mission.delta) & out.is_waypoint)
+        places = cls(np.array(points), np.array(waypoint), np.array(choice), present)
+        room = field.distance(places.points)
+        tight = np.flatnonzero((room < DIP_RATIO * mission.delta) & places.is_waypoint)
         if len(tight):
             n = tight[0]
-            choice = out.choice[n]
-            name = f"waypoints[{out.waypoint[n]}]" + (
+            choice = places.choice[n]
+            name = f"waypoints[{places.waypoint[n]}]" + (
                 f".alternatives[{choice - 1}]" if choice else ""
             )
             raise InputError(
                 f"{name}: is {'inside a solid' if room[n] < 0.0 else f'{room[n]:.3g} m from one'}; "
                 f"expected {DIP_RATIO * mission.delta:.3g} m of water or more"
             )
-        return out
+        return places
 
     def __len__(self) -> int:
         return len(self.points)

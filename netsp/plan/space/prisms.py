@@ -62,21 +62,21 @@ class FloorPlan:
         clearance, metres."""
         growth = min((g for _, g in self.polygons), default=0.0)
         growth = min([growth, *(0.5 * r for _, r in self.circles)])
-        out: list[Circle | Polygon] = [
+        obstacles: list[Circle | Polygon] = [
             Circle(center=center, radius=radius - growth) for center, radius in self.circles
         ]
         for corners, polygon_growth in self.polygons:
             polygon = Polygon(polygon=corners)
-            more = polygon_growth - growth
-            if more > 0.0:
+            extra_growth = polygon_growth - growth
+            if extra_growth > 0.0:
                 import shapely
 
                 # chords of a somewhat larger circle, so that none cuts the corner short
-                more /= math.cos(math.pi / (4 * corner_segments))
-                grown = shapely.Polygon(corners).buffer(more, quad_segs=corner_segments)
+                extra_growth /= math.cos(math.pi / (4 * corner_segments))
+                grown = shapely.Polygon(corners).buffer(extra_growth, quad_segs=corner_segments)
                 polygon = Polygon(polygon=tuple(grown.exterior.coords[:-1]))
-            out.append(polygon)
-        return tuple(out), growth
+            obstacles.append(polygon)
+        return tuple(obstacles), growth
 
 
 def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
@@ -84,8 +84,8 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
     that spans all depths in its reach; None for other scenes."""
     if scene.mesh is not None or scene.cloud is not None or scene.floor is not None:
         return None
-    anchor, far = np.array(mission.anchor), mission.tether_length
-    low, high = anchor - far, anchor + far
+    anchor, reach = np.array(mission.anchor), mission.tether_length
+    low, high = anchor - reach, anchor + reach
     if scene.bounds is not None:
         low = np.maximum(low, scene.bounds[:3])
         high = np.minimum(high, scene.bounds[3:])
@@ -105,7 +105,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
             if abs(shape.normal[2]) > UPRIGHT_TOLERANCE * math.hypot(*shape.normal):
                 return None
             normal = np.array(shape.normal[:2]) / math.hypot(*shape.normal[:2])
-            wall = wall_corners(np.array(shape.point[:2]), normal, anchor, far)
+            wall = wall_corners(np.array(shape.point[:2]), normal, anchor, reach)
             polygons.append((wall, scene.tether_radius))
             continue
         if not isinstance(shape, Post | Prism):
@@ -134,8 +134,8 @@ def _circle_of(shape: Shape, low: float, high: float) -> tuple[Corner, float] | 
     if isinstance(shape, Cylinder | Capsule):
         a, b = shape.a, shape.b
         axis = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-        through = min(a[2], b[2]) <= low and max(a[2], b[2]) >= high
-        if through and math.hypot(*axis) > 0.0 and _is_vertical(axis):
+        spans = min(a[2], b[2]) <= low and max(a[2], b[2]) >= high
+        if spans and math.hypot(*axis) > 0.0 and _is_vertical(axis):
             return (a[0], a[1]), shape.radius
     return None
 
@@ -148,8 +148,8 @@ def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ..
         axes = shape.axes()
         up = int(np.abs(axes[:, 2]).argmax())
         half = 0.5 * np.array(shape.size)
-        through = shape.center[2] - half[up] <= low and shape.center[2] + half[up] >= high
-        if through and abs(axes[up, 2]) >= 1.0 - UPRIGHT_TOLERANCE:
+        spans = shape.center[2] - half[up] <= low and shape.center[2] + half[up] >= high
+        if spans and abs(axes[up, 2]) >= 1.0 - UPRIGHT_TOLERANCE:
             a, b = (axes[k, :2] * half[k] for k in range(3) if k != up)
             middle = np.array(shape.center[:2])
             corners = (middle + a + b, middle - a + b, middle - a - b, middle + a - b)
@@ -248,11 +248,11 @@ class _PlaneTour:
         mission = context.mission
         start = len(places)  # number of the goal at the start, used if the start is not the anchor
         points = np.vstack([places.points, mission.start])
-        away = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
-        goals = np.arange(len(points) if away else start)
+        starts_elsewhere = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
+        goals = np.arange(len(points) if starts_elsewhere else start)
         goals = goals[self._goals_in_reach(points, goals, share)]
         needed = {places.present} if places.present is not None else set()
-        needed |= {start} if away else set()
+        needed |= {start} if starts_elsewhere else set()
         if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
             return None
         roadmap = TautRoadmap(
@@ -263,7 +263,9 @@ class _PlaneTour:
         graph = roadmap.to_travel_graph()
         place = np.r_[-1, goals][graph.cluster]
         home = (
-            self._vertex(roadmap, graph, place == start, context.start_tether.nodes) if away else 0
+            self._vertex(roadmap, graph, place == start, context.start_tether.nodes)
+            if starts_elsewhere
+            else 0
         )
         begin = None
         if places.present is not None:
@@ -311,8 +313,8 @@ class _PlaneTour:
     ) -> int | None:
         """Return the vertex of a place whose tether lies in the class of a line."""
         word = signature(line, roadmap.problem.representative_points)
-        same = [v for v in np.flatnonzero(is_at_place).tolist() if graph.signatures[v] == word]
-        return same[0] if same else None
+        matching = [v for v in np.flatnonzero(is_at_place).tolist() if graph.signatures[v] == word]
+        return matching[0] if matching else None
 
 
 def _solve_tour(

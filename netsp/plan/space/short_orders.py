@@ -49,12 +49,12 @@ def short_order_tour(
     clock = clock.part(policy.time_share)
     estimates = _estimate_lengths(context, places, clock, policy)
     best: DrivenTour | None = None
-    seen: set[tuple[int, ...]] = set()
+    driven_orders: set[tuple[int, ...]] = set()
     for _ in range(policy.max_rounds):
         order = _solve_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
-        if order is None or tuple(order) in seen:
+        if order is None or tuple(order) in driven_orders:
             return best
-        seen |= {tuple(order), tuple(order[::-1])}
+        driven_orders |= {tuple(order), tuple(order[::-1])}
         # a mission under way has one direction: from the robot to the start
         for direction in (order, order[::-1])[: 1 if places.present is not None else 2]:
             if clock.is_up:

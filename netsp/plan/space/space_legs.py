@@ -1,4 +1,4 @@
-"""Paths of the robot between waypoints, and how its tether comes out of them."""
+"""Paths of the robot between waypoints, and legs: paths along which the tether was driven."""
 
 from __future__ import annotations
 

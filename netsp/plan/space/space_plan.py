@@ -128,8 +128,8 @@ class SpacePlan:
     def all_waypoints(self) -> tuple[int, ...]:
         """Return the numbers of all waypoints: those of `order`, then the ones that no
         tether reaches."""
-        rest = set(range(len(self.mission.waypoints))) - set(self.order)
-        return (*self.order, *sorted(rest))
+        unvisited = set(range(len(self.mission.waypoints))) - set(self.order)
+        return (*self.order, *sorted(unvisited))
 
     planned = deprecated_method("planned", "to_mission")
     every_waypoint = deprecated_method("every_waypoint", "all_waypoints")
@@ -145,9 +145,9 @@ class SpacePlan:
         """
         if len(self.visits) != len(other.visits):
             return len(self.visits) > len(other.visits)
-        known = self.kind == TAUT_LEGS and other.kind == PLANE
+        has_bound = self.kind == TAUT_LEGS and other.kind == PLANE
         return self.length < other.length * (
-            1.0 + (self.context.policy.bound_worth if known else 0.0)
+            1.0 + (self.context.policy.bound_worth if has_bound else 0.0)
         )
 
     def _status(self, bound: float | None) -> Status:
@@ -202,10 +202,10 @@ class SpacePlan:
             exact=self.context.words.exact,
             unresolved_gaps=self.context.unresolved_gaps,
         )
-        all_of = self.mission.waypoints
+        given_waypoints = self.mission.waypoints
         waypoints = (
-            *(all_of[visit.waypoint].at(visit.choice) for visit in self.visits),
-            *(all_of[n] for n in self.all_waypoints[len(self.visits) :]),
+            *(given_waypoints[visit.waypoint].at(visit.choice) for visit in self.visits),
+            *(given_waypoints[n] for n in self.all_waypoints[len(self.visits) :]),
         )
         return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
 
@@ -610,8 +610,10 @@ class _StateSearch:
         is_complete = False
         for max_per_place in self.effort.states:
             begin = clock.elapsed
-            enough = board.legs or times.growth_share * clock.left >= times.min_growth_s
-            growing = clock.part(times.growth_share) if enough else Clock(times.min_growth_s)
+            share_suffices = board.legs or times.growth_share * clock.left >= times.min_growth_s
+            growing = (
+                clock.part(times.growth_share) if share_suffices else Clock(times.min_growth_s)
+            )
             has_grown = self.growth.grow(max_per_place, growing, on_progress)
             on_progress("ways by the anchor")
             has_homes = board.update(self.growth.legs, clock.part(times.home_path_share))

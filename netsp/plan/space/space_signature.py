@@ -137,20 +137,20 @@ class SpaceSignature:
         point = np.asarray(root, dtype=float)
         no_labels = np.empty(0, dtype=np.int32)
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
-        at = find_visible_cell(
+        root_cell = find_visible_cell(
             _labelled_complex(cells, no_labels, everywhere, tolerance, policy), point
         )
-        if at < 0:
+        if root_cell < 0:
             raise InputError(
                 f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
                 "expected a point in the water, or a smaller cell"
             )
-        begin = np.array(np.unravel_index(at, cells.flags.shape), dtype=np.int64)
+        begin = np.array(np.unravel_index(root_cell, cells.flags.shape), dtype=np.int64)
         stop = abandoned()
         far, order = cell_distances(cells.flags, begin, stop)
-        none = packed([])
+        no_rules = packed([])
         labels, table, generators = label_edges(
-            cells.flags, far, order, empty_table(), none, policy.max_generators, stop
+            cells.flags, far, order, empty_table(), no_rules, policy.max_generators, stop
         )
         end_if_abandoned()
         if generators > policy.max_generators:
@@ -158,7 +158,7 @@ class SpaceSignature:
                 f"cell: {cells.cell:g} m finds more than {policy.max_generators} holes in the "
                 "scene; expected a larger cell"
             )
-        words, table = square_relations(cells.flags, labels, order, table, none, stop)
+        words, table = square_relations(cells.flags, labels, order, table, no_rules, stop)
         end_if_abandoned()
         meaning, rank, relators = eliminated(
             generators, [word_of(table, int(number)) for number in words]

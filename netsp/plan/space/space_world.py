@@ -60,15 +60,15 @@ class CellLetters:
         """Return the words of straight steps, None through solids; ends in solids are moved out."""
         a, b = (pushed_out(self.field, points, PUSH_OUT_DISTANCE) for points in (starts, ends))
         # a step through a solid has no word, which is slow to find out from cells
-        far = np.linalg.norm(b - a, axis=1)
-        is_unsure = self.field.distance(a) < far
-        through = [
-            near and not self.field.line_of_sight(p, q, self.words.tolerance)
-            for near, p, q in zip(is_unsure, a, b, strict=True)
+        step_lengths = np.linalg.norm(b - a, axis=1)
+        is_unsure = self.field.distance(a) < step_lengths
+        hits_solid = [
+            unsure and not self.field.line_of_sight(p, q, self.words.tolerance)
+            for unsure, p, q in zip(is_unsure, a, b, strict=True)
         ]
         return [
             None if hits else self._word(np.stack(pair))
-            for hits, *pair in zip(through, a, b, strict=True)
+            for hits, *pair in zip(hits_solid, a, b, strict=True)
         ]
 
     def _word(self, step: Floats) -> Word | None:
@@ -182,16 +182,16 @@ class SpaceWorld:
             return None
         for other, tether in list(known) or [(self.start_word(), self.present_tether)]:
             begin = words.visible_cell(tether.robot)
-            far = math.dist(tether.robot, place)
-            if begin is None or far > policy.max_detour:
+            distance = math.dist(tether.robot, place)
+            if begin is None or distance > policy.max_detour:
                 continue
-            max_length = far + policy.max_detour
+            max_length = distance + policy.max_detour
             for number, path in self._paths(begin, end, max_length, policy.max_nearby_paths):
                 if words.product(other, words.letters(number)) != word:
                     continue
-                moved = self._relaxed(np.vstack([tether.nodes, path, place]), word)
-                if moved is not None:
-                    return moved
+                recovered = self._relaxed(np.vstack([tether.nodes, path, place]), word)
+                if recovered is not None:
+                    return recovered
             break  # tethers of other classes end at nearly the same place
         self._missed[word] = place
         if known:
@@ -237,7 +237,7 @@ class SpaceWorld:
         words, max_paths = self.context.words, self.policy.max_paths
         a, b = pushed_out(self.field, np.stack([before, after]), PUSH_OUT_DISTANCE)
         begin, end = words.visible_cell(a), words.visible_cell(b)
-        out: dict[Word, float] = {}
+        lengths: dict[Word, float] = {}
         straight = math.dist(a, b)
         if begin is not None and end is not None:
             searched = max(1.5 * straight, max_length) + 2.0 * words.cells.cell
@@ -245,11 +245,11 @@ class SpaceWorld:
                 # pulled taut it may pass another side of what cells show as one
                 taut = self.context.pull_taut(np.vstack([a, path, b]))
                 letters = words.letters(number)
-                out[letters] = min(out.get(letters, math.inf), polylines.length(taut))
+                lengths[letters] = min(lengths.get(letters, math.inf), polylines.length(taut))
         (direct,) = self.letters.words_of_steps(a[None], b[None])
-        if direct is not None or not out:
-            out[direct or ()] = min(out.get(direct or (), math.inf), straight)
-        order = sorted(out.items(), key=lambda pair: pair[1])
+        if direct is not None or not lengths:
+            lengths[direct or ()] = min(lengths.get(direct or (), math.inf), straight)
+        order = sorted(lengths.items(), key=lambda pair: pair[1])
         return [p for p in order if p[1] <= max(max_length, order[0][1])][:max_paths]
 
     def classes_on_side(
@@ -288,11 +288,15 @@ class SpaceWorld:
         """Return whether a tether comes nearest to a solid on one side, not on the opposite one."""
         if side not in self.sides:
             raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
-        alone = self._field_of(self._index(obstacle))
+        solid_field = self._field_of(self._index(obstacle))
         places = polylines.dense(nodes, 0.5 * self.model.delta)
-        distance = np.asarray(alone.distance(places))
-        near = distance <= max(float(distance.min()), 0.0) + self._contact_distance
-        sides = {s for away in alone.gradient(places[near]) for s in self._direction(away).split()}
+        distance = np.asarray(solid_field.distance(places))
+        is_touching = distance <= max(float(distance.min()), 0.0) + self._contact_distance
+        sides = {
+            s
+            for gradient in solid_field.gradient(places[is_touching])
+            for s in self._direction(gradient).split()
+        }
         meant, opposite = DIRECTIONS[side]
         return meant in sides and opposite not in sides
 
@@ -325,14 +329,14 @@ class SpaceWorld:
         """Describe a tether by the solids that it rests on."""
         inner = nodes[1:-1]
         touching = inner[self.field.distance(inner) <= self._contact_distance]
-        out: list[str] = []
+        descriptions: list[str] = []
         before = None
         for place, solid in zip(touching, self.field.nearest(touching), strict=True):
             if solid != before:
                 side = self._direction(self.field.gradient(place))
-                out.append(f"{beside(side, self.name_of(int(solid)))} (rests on it)")
+                descriptions.append(f"{beside(side, self.name_of(int(solid)))} (rests on it)")
             before = solid
-        return ", ".join(out) or "straight from the anchor"
+        return ", ".join(descriptions) or "straight from the anchor"
 
     def turning(self, nodes: Floats) -> float:
         """Return the sum of the angles by which a tether turns, rad."""

@@ -105,8 +105,8 @@ class States:
     @property
     def has_free_ends(self) -> bool:
         """Return whether tethers of one word hang in several ways at some place."""
-        of_words = {(s.place, s.word) for s in self.entries}
-        return len(of_words) < len(self.entries)
+        places_and_words = {(s.place, s.word) for s in self.entries}
+        return len(places_and_words) < len(self.entries)
 
     @property
     def reached(self) -> set[int]:

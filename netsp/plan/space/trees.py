@@ -29,29 +29,31 @@ def add_states_of_trees(states: States, robot_paths: RobotPaths, clock: Clock) -
     max_per_place, trade_offs = states.max_per_place, states.context.policy.states.tree_trade_offs
     states.max_per_place += len(trade_offs)
     roots = [
-        min(of, key=lambda s: states.entries[s].tether.length)
-        for of in states.at_place.values()
-        if of
+        min(numbers, key=lambda s: states.entries[s].tether.length)
+        for numbers in states.at_place.values()
+        if numbers
     ]
-    for trade in trade_offs:
-        _grow(states, robot_paths, clock, roots, trade)
+    for trade_off in trade_offs:
+        _grow(states, robot_paths, clock, roots, trade_off)
     states.max_per_place = max_per_place
 
 
 def _grow(
-    states: States, robot_paths: RobotPaths, clock: Clock, roots: list[int], trade: float
+    states: States, robot_paths: RobotPaths, clock: Clock, roots: list[int], trade_off: float
 ) -> None:
     """Grow one tree from the states with the shortest tethers, and drive the tether along it."""
     context = states.context
     # (key, tie, distance from the start, state, place, path); path -1 stands for a root itself
     waiting: list[tuple[float, int, float, int, int, int]] = []
     for s in roots:
-        far = states.entries[s].tether.length
-        waiting.append((far * (1.0 + trade), len(waiting), far, s, states.entries[s].place, -1))
+        distance = states.entries[s].tether.length
+        waiting.append(
+            (distance * (1.0 + trade_off), len(waiting), distance, s, states.entries[s].place, -1)
+        )
     heapq.heapify(waiting)
     tie, settled = len(waiting), set()
     while waiting and not clock.is_up:
-        _, _, far, s, point, k = heapq.heappop(waiting)
+        _, _, distance, s, point, k = heapq.heappop(waiting)
         if point in settled:
             continue
         arrived: int | None = s
@@ -73,5 +75,5 @@ def _grow(
             for j, (_, path) in enumerate(robot_paths.between(point, int(m))):
                 leg = polylines.length(path)
                 tie += 1
-                key = leg + trade * (far + leg)
-                heapq.heappush(waiting, (key, tie, far + leg, arrived, int(m), j))
+                key = leg + trade_off * (distance + leg)
+                heapq.heappush(waiting, (key, tie, distance + leg, arrived, int(m), j))

@@ -80,16 +80,16 @@ def order_by_going_on(
     """
     policy = policy or MissionPolicy()
     graph, points, start = waypoint_graph(mission, field, grid, clock, policy)
-    given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
+    given_order = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
     instance = LayeredInstance.of_graph(graph)
-    _, warm = best_classes(np.array(given), instance.start, instance.costs)
+    _, warm_start = best_classes(np.array(given_order), instance.start, instance.costs)
     result = solve_graph(
         graph,
         "lns",
         time_limit=clock,
         iteration_limit=policy.going_on.max_iterations,
         seed=seed,
-        warm_start=[int(v) for v in instance.original(warm)],
+        warm_start=[int(v) for v in instance.original(warm_start)],
     )
     assert result.tour is not None
     return tuple(points[v] for v in result.tour[1:])
@@ -130,16 +130,16 @@ def waypoint_graph(
     clock, policy = clock or Clock(), policy or MissionPolicy()
     points = mission.places
     found = _shortest_tethers(mission, field, grid, clock, policy)
-    near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
+    nearest = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
         :, 1 : policy.going_on.n_neighbours + 1
     ]
-    straight_legs = _drive_straight_legs(mission, field, found, near, clock, policy)
+    straight_legs = _drive_straight_legs(mission, field, found, nearest, clock, policy)
     count = len(found.point)
     lengths = np.array([t.length for t in found.tether])
     costs = np.zeros((count + 1, count + 1))
     costs[1:, 1:] = lengths[:, None] + lengths[None, :]
     costs[0, 1:] = costs[1:, 0] = lengths
-    neighbours = {(n, int(m)) for n in range(len(points)) for m in near[n]}
+    neighbours = {(n, int(m)) for n in range(len(points)) for m in nearest[n]}
     for v in range(count):
         clock.check("pulling legs taut")
         for w in range(v + 1, count):
@@ -183,7 +183,7 @@ def _drive_straight_legs(
     mission: Mission,
     field: DistanceField,
     found: _Classes,
-    near: Ints,
+    nearest: Ints,
     clock: Clock,
     policy: MissionPolicy,
 ) -> dict[tuple[int, int], float]:
@@ -197,7 +197,7 @@ def _drive_straight_legs(
     while v < len(found.point):
         clock.check("driving straight legs")
         n = found.point[v]
-        for m in near[n]:
+        for m in nearest[n]:
             if not is_straight_clear(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
