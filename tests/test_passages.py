@@ -13,7 +13,7 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.command.solve_mission import summary
-from netsp.online.execute.mission_repair import _gaps_named
+from netsp.online.execute.mission_repair import _name_gaps
 from netsp.plan.space.mission_policy import GapPolicy
 from netsp.plan.space.mission_solver import solve_mission
 from netsp.plan.space.passages import GapGrid, find_hidden_gaps, resolve_gaps
@@ -133,7 +133,7 @@ def test_every_way_to_a_plan_names_the_gaps_that_its_cells_do_not_show():
     for tour in (first.to_mission().tour, on_grid.to_mission().tour):
         (gap,) = tour.unresolved_gaps
         assert gap.width == pytest.approx(0.24, abs=0.005)
-    assert "0.24 m at (0, 0, " in _gaps_named(on_grid)
+    assert "0.24 m at (0, 0, " in _name_gaps(on_grid)
     # and a library's plan takes the cell that shows the gap, like a run
     finer = prepare_context(mission_of(), Clock(), scene=scene)
     assert finer.mission.cell == finer.grid.cell < 0.2

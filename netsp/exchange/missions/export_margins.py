@@ -19,20 +19,20 @@ def warnings(
     clearance : float
         Distance from obstacles below which a warning is due, in the problem's units.
     """
-    out = []
+    lines = []
     longest = max(solution.tour, key=lambda v: v.tether_length, default=None)
     if longest is not None and problem.tether_length - longest.tether_length < slack:
         left = problem.tether_length - longest.tether_length
-        out.append(
+        lines.append(
             f"only {left:.2f} {problem.units} of tether is left at "
             f"{problem.goal_label(longest.goal)}, less than the margin of {slack:g}: plan with a "
             "shorter tether_length, or set another margin"
         )
-    near = clearance_of(problem, points)
-    if near < clearance:
-        out.append(
-            f"the lines between waypoints come within {near:.2f} {problem.units} of an obstacle; "
-            f"less than the margin of {clearance:g}: plan with a larger clearance, or set another "
-            "margin"
+    nearest = clearance_of(problem, points)
+    if nearest < clearance:
+        lines.append(
+            f"the lines between waypoints come within {nearest:.2f} {problem.units} of an "
+            f"obstacle; less than the margin of {clearance:g}: plan with a larger clearance, or "
+            "set another margin"
         )
-    return out
+    return lines

@@ -172,10 +172,10 @@ def fence_of(
         if not _is_large(zone, policy) and policy.size([*kept, zone]) <= policy.max_bytes:
             kept.append(zone)
     kept.sort(key=lambda z: z.obstacle)
-    held = {z.obstacle for z in kept}
-    out = tuple(k for k in range(len(problem.obstacles)) if k not in held)
+    fenced = {z.obstacle for z in kept}
+    left_out = tuple(k for k in range(len(problem.obstacles)) if k not in fenced)
     touched = tuple(z.obstacle for z in kept if _distance(z.shape, line) <= policy.touch_distance)
-    return Fence(tuple(kept), out, policy.size(kept), touched)
+    return Fence(tuple(kept), left_out, policy.size(kept), touched)
 
 
 def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePolicy) -> list[Zone]:
@@ -200,12 +200,12 @@ def _fitting_zones(problem: Problem, line: shapely.LineString, policy: FencePoli
     if not fits(zones):
         return zones
     while step - too_small > 1:
-        middle = (too_small + step) // 2
-        tried = grown(middle)
+        middle_step = (too_small + step) // 2
+        tried = grown(middle_step)
         if fits(tried):
-            zones, step = tried, middle
+            zones, step = tried, middle_step
         else:
-            too_small = middle
+            too_small = middle_step
     return zones
 
 
@@ -234,10 +234,10 @@ def _simplified(
     limit = body.buffer(max_growth, quad_segs=policy.quarter_segments)
     best = zone
     for share in policy.offset_shares:
-        wide = body.buffer(share * max_growth, join_style="mitre") if share else body
+        offset_body = body.buffer(share * max_growth, join_style="mitre") if share else body
         for shape in (
-            wide.simplify((1.0 - share) * max_growth),
-            wide.convex_hull.simplify(0.5 * max_growth),
+            offset_body.simplify((1.0 - share) * max_growth),
+            offset_body.convex_hull.simplify(0.5 * max_growth),
         ):
             if shape.geom_type != "Polygon" or shape.interiors or len(shape.exterior.coords) < 4:
                 continue
@@ -249,10 +249,9 @@ def _simplified(
             if policy.size_of(tried) < policy.size_of(best):
                 best = tried
     circle = _circle_about(obstacle)
-    outside = circle.radius / np.cos(
-        np.pi / (4.0 * policy.quarter_segments)
-    )  # of a polygon around it
-    disc = shapely.Point(circle.center).buffer(outside, quad_segs=policy.quarter_segments)
+    # the disc is a polygon around the circle, whose corners lie farther out
+    circumradius = circle.radius / np.cos(np.pi / (4.0 * policy.quarter_segments))
+    disc = shapely.Point(circle.center).buffer(circumradius, quad_segs=policy.quarter_segments)
     round_zone = Zone(zone.obstacle, circle, max_growth)
     if (
         limit.covers(disc)

@@ -125,12 +125,12 @@ def _tether_folder(page: _Page, problem: Problem, points: Sequence[Waypoint]) ->
 
 def kmz_of(page: str) -> bytes:
     """Return an archive (KMZ) with a KML page as ``doc.kml``; equal pages give equal archives."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         entry = zipfile.ZipInfo("doc.kml")  # with a fixed date, 1980
         entry.compress_type = zipfile.ZIP_DEFLATED
         archive.writestr(entry, page.encode())
-    return out.getvalue()
+    return buffer.getvalue()
 
 
 def _is_visit(point: Waypoint) -> bool:
@@ -235,6 +235,6 @@ class _Page:
         is_hidden: bool = False,
         description: str = "",
     ) -> str:
-        more = "<visibility>0</visibility>" if is_hidden else ""
-        more += f"<description>{_text(description)}</description>" if description else ""
-        return f"<Folder><name>{name}</name>{more}\n{''.join(placemarks)}</Folder>\n"
+        extras = "<visibility>0</visibility>" if is_hidden else ""
+        extras += f"<description>{_text(description)}</description>" if description else ""
+        return f"<Folder><name>{name}</name>{extras}\n{''.join(placemarks)}</Folder>\n"

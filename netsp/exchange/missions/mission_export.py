@@ -135,23 +135,23 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
     """Return the start, bends, waypoints, and home; a bend without a turn is left out."""
     tour = mission.tour
     assert tour is not None
-    north = 0.0 if projection is None else projection.heading
-    out = [Waypoint(mission.begin, None, start=True)]
+    north_heading = 0.0 if projection is None else projection.heading
+    points = [Waypoint(mission.begin, None, start=True)]
     for k, visit in enumerate(tour.stops):
-        out += _bends(visit.path)
+        points += _bends(visit.path)
         heading = mission.waypoints[k].heading
-        out.append(
+        points.append(
             Waypoint(
                 visit.path[-1],
                 k,
                 visit.signature,
                 visit.tether_length,
                 # from the x axis towards y, to clockwise from north
-                heading=None if heading is None else (north + 90.0 - heading) % 360.0,
+                heading=None if heading is None else (north_heading + 90.0 - heading) % 360.0,
                 stay=math.ceil(mission.waypoints[k].dwell),
             )
         )
-    return [*out, *_bends(tour.home), Waypoint(mission.start, HOME)]
+    return [*points, *_bends(tour.home), Waypoint(mission.start, HOME)]
 
 
 def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
@@ -177,14 +177,14 @@ def pursued(line: Floats, radius: float) -> Floats:
     radius : float
         Acceptance radius, metres.
     """
-    out = [line[0]]
+    path = [line[0]]
     for k, target in enumerate(line[1:], 1):
-        position = out[-1]
+        position = path[-1]
         distance = float(np.linalg.norm(target - position))
-        short = radius if k < len(line) - 1 else 0.0
-        if distance > short:
-            out.append(position + (target - position) * (1.0 - short / distance))
-    return np.array(out)
+        stop_distance = radius if k < len(line) - 1 else 0.0
+        if distance > stop_distance:
+            path.append(position + (target - position) * (1.0 - stop_distance / distance))
+    return np.array(path)
 
 
 def _check_free(field: DistanceField, line: Floats, radius: float) -> None:

@@ -223,16 +223,16 @@ def fence_of_points(problem: Problem, points: list[Waypoint], settings: ExportSe
 
 def not_written(problem: Problem, kind: str) -> str | None:
     """Return a note on the parts of a problem that a format cannot store; None if it stores all."""
-    lost = []
+    missing = []
     if kind in ("wpl", "cockpit"):
-        lost += ["the tether's length", "the clearance"]
-        lost += ["obstacles"] if problem.obstacles else []
-        lost += ["names of goals"] if any(g.name is not None for g in problem.goals) else []
+        missing += ["the tether's length", "the clearance"]
+        missing += ["obstacles"] if problem.obstacles else []
+        missing += ["names of goals"] if any(g.name is not None for g in problem.goals) else []
     if kind == "plan" and any(o.name is not None for o in problem.obstacles):
-        lost.append("names of obstacles")
-    lost += ["bounds"] if problem.bounds is not None else []
-    lost += ["the state of the tether"] if problem.state is not None else []
-    return f"not written in this format: {', '.join(lost)}" if lost else None
+        missing.append("names of obstacles")
+    missing += ["bounds"] if problem.bounds is not None else []
+    missing += ["the state of the tether"] if problem.state is not None else []
+    return f"not written in this format: {', '.join(missing)}" if missing else None
 
 
 def altitude(z: float, policy: ExportPolicy = DEFAULT_EXPORT) -> float:
@@ -247,12 +247,12 @@ def with_distinct_holds(points: Sequence[Waypoint], settings: ExportSettings) ->
     a waypoint when it saves the file. The hold at bends in the settings is the minimum.
     """
     holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
-    free = (
+    free_holds = (
         s
         for s in range(settings.bend_hold_s, settings.bend_hold_s + len(holds) + 1)
         if s not in holds
     )
-    return replace(settings, bend_hold_s=next(free))
+    return replace(settings, bend_hold_s=next(free_holds))
 
 
 def _hold(point: Waypoint, settings: ExportSettings) -> int:
@@ -454,9 +454,9 @@ def _lonlat(projection: Projection, place: Sequence[float]) -> list[float]:
 
 
 def _feature(kind: str, shape: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
-    known = {"kind": kind, **{k: v for k, v in properties.items() if v is not None}}
+    stated = {"kind": kind, **{k: v for k, v in properties.items() if v is not None}}
     geometry = {"type": shape, "coordinates": coordinates}
-    return {"type": "Feature", "properties": known, "geometry": geometry}
+    return {"type": "Feature", "properties": stated, "geometry": geometry}
 
 
 def _obstacle_feature(obstacle: Circle | Polygon, projection: Projection) -> dict[str, Any]:

@@ -80,27 +80,27 @@ def waypoints_of(
     solids = [o.shape() for o in problem.obstacles]
     shapely.prepare(solids)
     points: list[Floats] = [legs[0].path[0]]
-    kinds: list[Mark] = [(None, (), 0.0)]
+    all_marks: list[Mark] = [(None, (), 0.0)]
     for leg in legs:
         for point in leg.path[1:-1]:
             points.append(point)
-            kinds.append((None, (), 0.0))
+            all_marks.append((None, (), 0.0))
         points.append(leg.path[-1])
-        kinds.append((leg.goal, leg.word, leg.tether))
-    keep = [0]
+        all_marks.append((leg.goal, leg.word, leg.tether))
+    kept = [0]
     for k in range(1, len(points)):
-        previous = points[keep[-1]]
-        if np.linalg.norm(points[k] - previous) == 0.0 and kinds[k][0] is None:
+        previous = points[kept[-1]]
+        if np.linalg.norm(points[k] - previous) == 0.0 and all_marks[k][0] is None:
             continue
         if (
             k + 1 < len(points)
-            and kinds[k][0] is None
+            and all_marks[k][0] is None
             and turn(previous, points[k], points[k + 1]) < TURN_TOLERANCE
         ):
             continue
-        keep.append(k)
-    line = np.array([points[k] for k in keep])
-    marks = [kinds[k] for k in keep]
+        kept.append(k)
+    line = np.array([points[k] for k in kept])
+    marks = [all_marks[k] for k in kept]
     line, marks = _coarsened(
         line, marks, [o.shape(problem.clearance) for o in problem.obstacles], policy.max_arc_turn
     )
@@ -136,33 +136,33 @@ def _coarsened(
     """
     slim = [g.buffer(-1e-6 * float(np.ptp(line[:, :2]))) for g in grown]
     tree = shapely.STRtree(slim) if slim else None
-    out, kept, k = [line[0]], [marks[0]], 1
+    points, kept_marks, k = [line[0]], [marks[0]], 1
     while k < len(line):
         best = None
         m = k
         total = 0.0
         while m + 1 < len(line) and marks[m][0] is None:
-            total += _side(out[-1] if m == k else line[m - 1], line[m], line[m + 1])
+            total += _side(points[-1] if m == k else line[m - 1], line[m], line[m + 1])
             if abs(total) > max_turn:
                 break
-            corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
+            corner = _meeting(points[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
             if corner is not None:
                 paths = [
                     shapely.LineString([a[:2], b[:2]])
-                    for a, b in ((out[-1], corner), (corner, line[m + 1]))
+                    for a, b in ((points[-1], corner), (corner, line[m + 1]))
                 ]
                 if tree is None or not any(len(tree.query(w, "intersects")) for w in paths):
                     best = (m, corner)
             m += 1
         if best is None:
-            out.append(line[k])
-            kept.append(marks[k])
+            points.append(line[k])
+            kept_marks.append(marks[k])
             k += 1
         else:
-            out.append(best[1])
-            kept.append(marks[k])
+            points.append(best[1])
+            kept_marks.append(marks[k])
             k = best[0] + 1
-    return np.array(out), kept
+    return np.array(points), kept_marks
 
 
 def _side(a: Floats, b: Floats, c: Floats) -> float:
@@ -212,33 +212,33 @@ def _widened(
     if radius <= 0.0 or not solids:
         return line
     tree = shapely.STRtree(solids)
-    out = line.copy()
+    widened = line.copy()
     for k in range(1, len(line) - 1):
-        if marks[k][0] is not None or not _cuts(tree, out, k, radius):
+        if marks[k][0] is not None or not _cuts(tree, widened, k, radius):
             continue
-        middle = 0.5 * (out[k - 1, :2] + out[k + 1, :2])
-        away = out[k, :2] - middle
-        distance = float(np.linalg.norm(away))
+        middle = 0.5 * (widened[k - 1, :2] + widened[k + 1, :2])
+        outward = widened[k, :2] - middle
+        distance = float(np.linalg.norm(outward))
         if distance == 0.0:
             continue
-        for times in shifts:
-            tried = out.copy()
-            tried[k, :2] += away / distance * times * radius
-            free = not any(
+        for shift in shifts:
+            tried = widened.copy()
+            tried[k, :2] += outward / distance * shift * radius
+            is_free = not any(
                 len(tree.query(shapely.LineString(tried[[i, i + 1], :2]), "intersects"))
                 for i in (k - 1, k)
             )
-            if free and not _cuts(tree, tried, k, radius):
-                out = tried
+            if is_free and not _cuts(tree, tried, k, radius):
+                widened = tried
                 break
-    bad = [k for k in range(1, len(out) - 1) if _cuts(tree, out, k, radius)]
-    if bad:
-        x, y, _ = out[bad[0]]
+    cut_bends = [k for k in range(1, len(widened) - 1) if _cuts(tree, widened, k, radius)]
+    if cut_bends:
+        x, y, _ = widened[cut_bends[0]]
         raise InputError(
             f"acceptance: {radius:g} would let the vehicle cut a corner at ({x:.6g}, {y:.6g}) "
             "through an obstacle; expected a smaller radius, or a plan with a larger clearance"
         )
-    return out
+    return widened
 
 
 def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
@@ -261,8 +261,8 @@ def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list
     for (a, b), (goal, planned, _) in zip(pairwise(line), marks[1:], strict=True):
         word = concatenate(word, crossings(np.array([a, b])[:, :2], rays))
         step = shapely.LineString([a[:2], b[:2]])
-        inside = [s for s in solids if s.buffer(-1e-6 * problem.scale).intersects(step)]
-        if inside:
+        entered = [s for s in solids if s.buffer(-1e-6 * problem.scale).intersects(step)]
+        if entered:
             raise InputError("solution: straight lines between its waypoints enter an obstacle")
         if goal is not None and word != (planned if goal != HOME else ()):
             raise InputError("solution: its waypoints are not of the plan's homotopy class")

@@ -26,51 +26,51 @@ def pushed_aside(problem: Problem, nodes: Floats, by: float) -> Floats:
             continue
         # a stretch around the rim enters the core again at most at its own ends
         for _ in range(20):
-            flat = shapely.LineString(line[:, :2])
-            inside = flat.intersection(core)
-            if flat.length == 0.0 or inside.is_empty:
+            line_in_plan = shapely.LineString(line[:, :2])
+            inside = line_in_plan.intersection(core)
+            if line_in_plan.length == 0.0 or inside.is_empty:
                 break
-            first = min(
+            first_inside = min(
                 (p for p in getattr(inside, "geoms", [inside])),
-                key=lambda p: flat.project(shapely.Point(p.coords[0])),
+                key=lambda p: line_in_plan.project(shapely.Point(p.coords[0])),
             )
-            middle = flat.project(first.interpolate(0.5, normalized=True))
-            outside = flat.difference(rim)
+            middle = line_in_plan.project(first_inside.interpolate(0.5, normalized=True))
+            outside = line_in_plan.difference(rim)
             pieces = list(getattr(outside, "geoms", [outside]))
             spans = [
-                sorted(flat.project(shapely.Point(p.coords[k])) for k in (0, -1))
+                sorted(line_in_plan.project(shapely.Point(p.coords[k])) for k in (0, -1))
                 for p in pieces
                 if not p.is_empty
             ]
             start = max((b for _, b in spans if b <= middle), default=0.0)
             end = min((a for a, _ in spans if a >= middle), default=None)
-            line = _round(line, rim, start, end)
+            line = _led_around(line, rim, start, end)
     return line
 
 
-def _round(line: Floats, rim: shapely.Polygon, start: float, end: float | None) -> Floats:
+def _led_around(line: Floats, rim: shapely.Polygon, start: float, end: float | None) -> Floats:
     """Return a line with its stretch from `start` to `end` (lengths in the plan) along a rim;
     without an end, cut off at the start."""
     s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))]
 
-    def at(u: float) -> Floats:
-        return np.array([np.interp(u, s, line[:, k]) for k in range(3)])
+    def point_at(distance: float) -> Floats:
+        return np.array([np.interp(distance, s, line[:, k]) for k in range(3)])
 
-    head = np.vstack([line[s < start], at(start)])
+    head = np.vstack([line[s < start], point_at(start)])
     if end is None:
         return head
     ring = rim.exterior
-    a, b = (ring.project(shapely.Point(at(u)[:2])) for u in (start, end))
+    a, b = (ring.project(shapely.Point(point_at(distance)[:2])) for distance in (start, end))
     low, high = min(a, b), max(a, b)
-    one = np.array(substring(ring, low, high).coords)
-    other = np.vstack(
+    arc_ahead = np.array(substring(ring, low, high).coords)
+    arc_behind = np.vstack(
         [
             np.array(substring(ring, high, ring.length).coords),
             np.array(substring(ring, 0.0, low).coords),
         ]
     )
-    one = one if a <= b else one[::-1]
-    other = other[::-1] if a <= b else other
-    arc = min((one, other), key=lambda w: float(np.hypot(*np.diff(w, axis=0).T).sum()))
-    z = np.linspace(at(start)[2], at(end)[2], len(arc))
-    return np.vstack([head, np.column_stack([arc, z]), at(end), line[s > end]])
+    arc_ahead = arc_ahead if a <= b else arc_ahead[::-1]
+    arc_behind = arc_behind[::-1] if a <= b else arc_behind
+    arc = min((arc_ahead, arc_behind), key=lambda w: float(np.hypot(*np.diff(w, axis=0).T).sum()))
+    z = np.linspace(point_at(start)[2], point_at(end)[2], len(arc))
+    return np.vstack([head, np.column_stack([arc, z]), point_at(end), line[s > end]])

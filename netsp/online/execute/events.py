@@ -17,7 +17,7 @@ from netsp.online.execute.execute_policy import ExecutePolicy
 from netsp.world.simulator.timed_events import TimedEvent, check_in_turn
 
 
-def _which(value: Any) -> Any:
+def _checked_which(value: Any) -> Any:
     if isinstance(value, str):
         return value
     try:
@@ -29,7 +29,7 @@ def _which(value: Any) -> Any:
     raise ValueError(f"expected a name or an index from 0 on, got {shown(value)}")
 
 
-Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
+Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_checked_which)]
 """Index or name of an obstacle or goal; without a name, `#index` as in messages."""
 
 
@@ -106,7 +106,7 @@ def problem_after(
         The event names something that is not there, or puts an obstacle onto the base.
     """
     obstacles, goals = list(problem.obstacles), list(problem.goals)
-    update: dict[str, object] = {}
+    changes: dict[str, object] = {}
     if event.appear is not None:
         obstacles.append(event.appear)
     elif event.vanish is not None:
@@ -119,26 +119,26 @@ def problem_after(
     elif event.cancel_goal is not None:
         index_of(event.cancel_goal, goals, "cancel_goal")
     elif event.tether_length is not None:
-        update["tether_length"] = event.tether_length
-    update |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
-    out = problem.model_copy(update=update)
-    if complaint := out.size_complaint():
+        changes["tether_length"] = event.tether_length
+    changes |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
+    changed = problem.model_copy(update=changes)
+    if complaint := changed.size_complaint():
         raise InputError(f"{event.kind}: {complaint}")
     if event.appear is not None and problem.origin is not None:
         _check_size(event.appear, problem, policy)
     if event.add_goal is not None:
-        away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
+        distance = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
         max_distance = MAX_EXTENT_RATIO * max(problem.tether_length, problem.scale)
-        if away > max_distance:
+        if distance > max_distance:
             raise InputError(
-                f"add_goal: is {away:.4g} from the base; expected at most {max_distance:.4g}, "
+                f"add_goal: is {distance:.4g} from the base; expected at most {max_distance:.4g}, "
                 f"{MAX_EXTENT_RATIO:g} times the size of the problem"
             )
-    base = np.array([out.base[:2]])
-    for i, o in enumerate(out.obstacles):
-        if float(o.signed_distance(base)[0]) < out.clearance - out.tolerance:
-            raise InputError(f"{event.kind}: {out.obstacle_label(i)} would stand on the base")
-    return out
+    base = np.array([changed.base[:2]])
+    for i, o in enumerate(changed.obstacles):
+        if float(o.signed_distance(base)[0]) < changed.clearance - changed.tolerance:
+            raise InputError(f"{event.kind}: {changed.obstacle_label(i)} would stand on the base")
+    return changed
 
 
 def _check_size(obstacle: Circle | Polygon, problem: Problem, policy: ExecutePolicy) -> None:

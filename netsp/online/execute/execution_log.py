@@ -76,7 +76,7 @@ class ExecutionOptions:
 
 @dataclass(frozen=True)
 class ExecutionRow:
-    """One step.
+    """Row of the log: one step.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class Execution(Drawn):
     options : ExecutionOptions
         Options of the execution.
     rows : list of ExecutionRow
-        One per step.
+        Rows, one for each step.
     arrivals : list of Arrival
         Goals reached.
     entries : list of Entry

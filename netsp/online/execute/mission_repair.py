@@ -58,7 +58,7 @@ class Repair:
     planning_s: float
 
 
-def _gaps_named(found: SpacePlan) -> str:
+def _name_gaps(found: SpacePlan) -> str:
     """Return words for the gaps that the grid of a plan does not show."""
     gaps = found.context.unresolved_gaps
     if not gaps:
@@ -133,7 +133,7 @@ class RepairPlanner(PredictivePlanner):
             self._must_check = False
             begin = time.process_time()
             try:
-                self._mend(robot, tether)
+                self._check_and_repair(robot, tether)
             except Exception as error:  # never leave a vehicle without a command
                 if is_interrupt(error):
                     raise KeyboardInterrupt from error
@@ -186,7 +186,7 @@ class RepairPlanner(PredictivePlanner):
         super()._next()
         self._walked = self._walked[-1:]
 
-    def _mend(self, robot: Floats, tether: Tether) -> None:
+    def _check_and_repair(self, robot: Floats, tether: Tether) -> None:
         """Check the rest of the tour, and repair it if it no longer holds."""
         begin = time.process_time()
         rest = self._remaining_tour(robot, tether)
@@ -197,9 +197,11 @@ class RepairPlanner(PredictivePlanner):
         if rest.reason is None:
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
-        worth = rest.planned_length + self.options.planning_limit * self.mission.speed
+        min_worthwhile_length = (
+            rest.planned_length + self.options.planning_limit * self.mission.speed
+        )
         added, self._has_new_waypoint = self._has_new_waypoint, False
-        is_worthwhile = added or not rest.is_complete or rest.length > worth
+        is_worthwhile = added or not rest.is_complete or rest.length > min_worthwhile_length
         is_worthwhile &= not self.is_homeward
         response, chosen = choose_repair(
             rest if rest.is_complete else None,
@@ -208,7 +210,7 @@ class RepairPlanner(PredictivePlanner):
         )
         if isinstance(chosen, SpacePlan):
             self._follow_plan(chosen)
-            self._note(response, f"{rest.reason}{_gaps_named(chosen)}", chosen.length, begin)
+            self._note(response, f"{rest.reason}{_name_gaps(chosen)}", chosen.length, begin)
         elif chosen is not None:
             self._follow_rest(chosen)
             self._note(response, rest.reason, chosen.length, begin)
@@ -229,11 +231,11 @@ class RepairPlanner(PredictivePlanner):
             return None  # only waypoints that the tour leaves out remain
         rest, place = _RemainingTour(), robot
         for k in range(self.index, len(tour.stops) + 1):
-            home = k == len(tour.stops)
-            name = "the way home" if home else f"the way to waypoint #{k}"
-            planned = np.array(tour.home if home else tour.stops[k].path)
+            is_home = k == len(tour.stops)
+            name = "the way home" if is_home else f"the way to waypoint #{k}"
+            planned = np.array(tour.home if is_home else tour.stops[k].path)
             rest.planned_length += polylines.length(planned)
-            if not home and self._is_lost(k):
+            if not is_home and self._is_lost(k):
                 rest.reason = rest.reason or f"a solid stands on waypoint #{k}"
                 rest.blocked.append(k)
                 continue
@@ -245,7 +247,7 @@ class RepairPlanner(PredictivePlanner):
                 rest.reason = rest.reason or obstacle
                 leg = self._path_around(place, planned[-1])
                 tether_after, _ = self._drive_leg(tether, leg, name)
-            if tether_after is not None and home and not self._is_free(tether_after):
+            if tether_after is not None and is_home and not self._is_free(tether_after):
                 rest.reason = rest.reason or "the tether would not be free at home"
                 leg = self.pull_taut(self.back_along(tether))
                 tether_after, _ = self._drive_leg(tether, leg, name)
@@ -256,7 +258,7 @@ class RepairPlanner(PredictivePlanner):
                 break
             tether, place = tether_after, leg[-1]
             rest.legs.append((leg, tether.length))
-            rest.visited += [] if home else [k]
+            rest.visited += [] if is_home else [k]
         return rest
 
     def _path_around(self, begin: Floats, end: Floats) -> Floats | None:
@@ -301,10 +303,10 @@ class RepairPlanner(PredictivePlanner):
     def _plan_rest(self, robot: Floats, tether: Tether) -> SpacePlan:
         """Plan a tour from the robot's position through the remaining waypoints, by the map."""
         mission = self.mission
-        place = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
-        line = np.vstack([tether.nodes[:-1], place])
-        state = MissionState(position=thinned_path(place[None])[0], tether=thinned_path(line))
-        rest = mission.model_copy(
+        free_place = pushed_out(self.scene, robot[None], 1e-3)[0] if self._inside(robot) else robot
+        line = np.vstack([tether.nodes[:-1], free_place])
+        state = MissionState(position=thinned_path(free_place[None])[0], tether=thinned_path(line))
+        rest_of_mission = mission.model_copy(
             update={
                 "state": state,
                 "tour": None,
@@ -315,7 +317,7 @@ class RepairPlanner(PredictivePlanner):
             }
         )
         return plan(
-            rest,
+            rest_of_mission,
             field=self.scene,
             grid=self.grid,
             time_limit=self.options.planning_limit,
@@ -338,26 +340,32 @@ class RepairPlanner(PredictivePlanner):
 
     def _follow_plan(self, found: SpacePlan) -> None:
         """Follow a new tour; the remaining waypoints come in its order from now on."""
-        rest = found.to_mission(seed=self.options.seed)
-        assert rest.tour is not None
+        planned_mission = found.to_mission(seed=self.options.seed)
+        assert planned_mission.tour is not None
         free_waypoints = [k for k in self._left if not self._is_lost(k)]
         lost = [k for k in self._left if self._is_lost(k)]
-        left = [*(free_waypoints[n] for n in found.all_waypoints), *lost]
-        waypoints = (*rest.waypoints, *(self.mission.waypoints[k] for k in lost))
-        self._splice(rest.tour, rest.tour.stops, rest.tour.home, waypoints, left)
+        remaining = [*(free_waypoints[n] for n in found.all_waypoints), *lost]
+        waypoints = (*planned_mission.waypoints, *(self.mission.waypoints[k] for k in lost))
+        self._splice(
+            planned_mission.tour,
+            planned_mission.tour.stops,
+            planned_mission.tour.home,
+            waypoints,
+            remaining,
+        )
 
     def _follow_rest(self, rest: _RemainingTour) -> None:
         """Follow the same tour, around the obstacles."""
         tour = self.mission.tour
         assert tour is not None
-        stops = tuple(
+        visits = tuple(
             tour.stops[k].model_copy(update={"path": thinned_path(path), "tether_length": length})
             for k, (path, length) in zip(rest.visited, rest.legs, strict=False)
         )
         beyond = range(max(self.index, len(tour.stops)), len(self.mission.waypoints))
-        left = [*rest.visited, *rest.blocked, *beyond]
-        waypoints = tuple(self.mission.waypoints[k] for k in left)
-        self._splice(tour, stops, thinned_path(rest.legs[-1][0]), waypoints, left)
+        remaining = [*rest.visited, *rest.blocked, *beyond]
+        waypoints = tuple(self.mission.waypoints[k] for k in remaining)
+        self._splice(tour, visits, thinned_path(rest.legs[-1][0]), waypoints, remaining)
 
     def _splice(
         self,
@@ -371,18 +379,18 @@ class RepairPlanner(PredictivePlanner):
 
         In the file of the tour, the first leg begins at the last visit.
         """
-        old, n = self.mission.tour, self.index
+        old_tour, begin = self.mission.tour, self.index
         file = self._as_given
         assert file is not None
         assert file.tour is not None
         numbers = dict(enumerate(stop.given_as for stop in file.tour.stops))
-        self.given = [*self.given[:n], *(self.given[k] for k in left)]
-        assert old is not None
+        self.given = [*self.given[:begin], *(self.given[k] for k in left)]
+        assert old_tour is not None
         stops = tuple(
-            stop.model_copy(update={"given_as": numbers.get(self.given[n + k])})
+            stop.model_copy(update={"given_as": numbers.get(self.given[begin + k])})
             for k, stop in enumerate(stops)
         )
-        self._first = (n, np.array(stops[0].path if stops else home))
+        self._first = (begin, np.array(stops[0].path if stops else home))
         walked = thinned_path(np.vstack([np.array(self._walked), self._first[1]]))
         if stops:
             stops = (stops[0].model_copy(update={"path": walked}), *stops[1:])
@@ -390,8 +398,10 @@ class RepairPlanner(PredictivePlanner):
             home = walked
         self.mission = self.mission.model_copy(
             update={
-                "waypoints": (*self.mission.waypoints[:n], *waypoints),
-                "tour": tour.model_copy(update={"stops": (*old.stops[:n], *stops), "home": home}),
+                "waypoints": (*self.mission.waypoints[:begin], *waypoints),
+                "tour": tour.model_copy(
+                    update={"stops": (*old_tour.stops[:begin], *stops), "home": home}
+                ),
             }
         )
         self.path, self._planned = self.path[:0], -1

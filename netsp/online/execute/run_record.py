@@ -97,9 +97,9 @@ class RunState(FileModel):
                 f"{source}: problem_sha256: is of another problem; expected the {PROBLEM} that the "
                 "run wrote, unchanged"
             )
-        out = tuple(g.goal for g in self.left_out)
-        named = {"left": self.left, "left_out": out, "cancelled": self.cancelled}
-        for field_name, goals in named.items():
+        left_out = tuple(g.goal for g in self.left_out)
+        goals_by_field = {"left": self.left, "left_out": left_out, "cancelled": self.cancelled}
+        for field_name, goals in goals_by_field.items():
             for goal in goals:
                 if goal >= len(problem.goals):
                     raise InputError(
@@ -107,13 +107,13 @@ class RunState(FileModel):
                         f"{goal}"
                     )
         for goal in self.left:
-            if self.left.count(goal) > 1 or goal in (*out, *self.cancelled):
+            if self.left.count(goal) > 1 or goal in (*left_out, *self.cancelled):
                 raise InputError(
                     f"{source}: left: expected every goal once in left, left_out and cancelled, "
                     f"got {goal} twice"
                 )
-        away = float(np.linalg.norm(np.array(self.tether[0]) - np.array(problem.base)))
-        if away > 1e-6 * problem.scale:
+        distance = float(np.linalg.norm(np.array(self.tether[0]) - np.array(problem.base)))
+        if distance > 1e-6 * problem.scale:
             raise InputError(f"{source}: tether: expected to begin at the base of the problem")
 
 

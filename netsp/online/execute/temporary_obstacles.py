@@ -43,21 +43,23 @@ class TemporaryObstacle:
 def lasting_problem(maps: Maps) -> Problem:
     """Return the first problem with only those obstacles that stand there all the time."""
     first = maps[0][1]
-    every = [p.obstacles for _, p in maps]
-    kept = tuple(o for o in first.obstacles if all(o in obstacles for obstacles in every))
-    return first.model_copy(update={"obstacles": kept})
+    obstacles_of_maps = [p.obstacles for _, p in maps]
+    lasting = tuple(
+        o for o in first.obstacles if all(o in obstacles for obstacles in obstacles_of_maps)
+    )
+    return first.model_copy(update={"obstacles": lasting})
 
 
 def temporary_obstacles(maps: Maps) -> list[TemporaryObstacle]:
     """Return the other obstacles of all problems, in the order in which they came."""
     found: list[TemporaryObstacle] = []
-    always = lasting_problem(maps).obstacles
+    lasting = lasting_problem(maps).obstacles
     for k, (time, problem) in enumerate(maps):
         for i, obstacle in enumerate(problem.obstacles):
-            if obstacle in always or (k and obstacle in maps[k - 1][1].obstacles):
+            if obstacle in lasting or (k and obstacle in maps[k - 1][1].obstacles):
                 continue
-            gone = (t for t, later in maps[k:] if obstacle not in later.obstacles)
+            end_times = (t for t, later in maps[k:] if obstacle not in later.obstacles)
             found.append(
-                TemporaryObstacle(obstacle, problem.obstacle_name(i), time, next(gone, None))
+                TemporaryObstacle(obstacle, problem.obstacle_name(i), time, next(end_times, None))
             )
     return found

@@ -134,8 +134,8 @@ def _times(over: Sequence[Overrun], units: str, max_times: int = 5) -> str:
         f"{o.begin_s:.1f} to {o.end_s:.1f} s: up to {o.longest:.4g} of {o.limit:g} {units}"
         for o in over[:max_times]
     ]
-    rest = f"; {len(over) - max_times} more" if len(over) > max_times else ""
-    return f" ({'; '.join(periods)}{rest})"
+    others = f"; {len(over) - max_times} more" if len(over) > max_times else ""
+    return f" ({'; '.join(periods)}{others})"
 
 
 def _runs(values: Floats) -> list[tuple[int, int]]:

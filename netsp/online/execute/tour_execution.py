@@ -202,25 +202,26 @@ class _Run:
             self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
         self.fresh = False
-        took = self.step if self.live is None else self.live.time - self.now
-        self.now += took
-        self.leg_s += took
+        step_s = self.step if self.live is None else self.live.time - self.now
+        self.now += step_s
+        self.leg_s += step_s
         self._follow(points)
         end = self.path[-1]
         self.path = self.path[min(passed, len(self.path) - 1) :]
-        near = (
+        max_distance = (
             1e-9 * self.problem.scale if self.options.vehicle == "kinematic" else self.options.reach
         )
-        is_there = (
-            len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near
+        has_arrived = (
+            len(self.path) == 1
+            and float(np.linalg.norm(self.vehicle.position - end)) <= max_distance
         )
         policy, leg_s = self.policy, self.legs[0].length / self.options.speed
         is_late = self.leg_s > policy.leg_grace_s + policy.max_leg_time_ratio * leg_s
         if self.retreat is not None:
-            if is_there or is_late or self.tether.length <= self.retreat.length:
-                done, self.retreat = self.retreat, None
-                self._replan(done.why, done.left, done.event)
-        elif is_there:
+            if has_arrived or is_late or self.tether.length <= self.retreat.length:
+                retreat, self.retreat = self.retreat, None
+                self._replan(retreat.why, retreat.left, retreat.event)
+        elif has_arrived:
             self._arrive()
         elif is_late:
             self._leave_out(self.legs[0].goal, "not reached in time")
@@ -290,7 +291,9 @@ class _Run:
             )
         if reason is None:
             limit = self._reserved(left) if self.options.repair else None
-            reason, legs = plan_fault(self.problem, self.tether.nodes, self._from_here(), limit)
+            reason, legs = plan_fault(
+                self.problem, self.tether.nodes, self._legs_from_here(), limit
+            )
             if reason is None:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
@@ -310,19 +313,19 @@ class _Run:
         if event.push is not None:
             self._push(np.array(event.push))
             return left, "pushed off its path"
-        before = self.problem
+        old_problem = self.problem
         self._enter_problem_after(event)
         if event.add_goal is not None:
-            new = len(before.goals)
-            left, reason = [*left, new], f"{self.problem.goal_label(new)} was added"
+            added = len(old_problem.goals)
+            left, reason = [*left, added], f"{self.problem.goal_label(added)} was added"
         elif event.cancel_goal is not None:
-            gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
-            if gone in left:
-                left = [g for g in left if g != gone]
-                reason = f"{before.goal_label(gone)} was cancelled"
-            if self.options.repair and (gone in self.left or gone in self.out.left_out):
-                self.out.left_out.pop(gone, None)
-                self.out.cancelled[gone] = self.now
+            cancelled = index_of(event.cancel_goal, list(old_problem.goals), "cancel_goal")
+            if cancelled in left:
+                left = [g for g in left if g != cancelled]
+                reason = f"{old_problem.goal_label(cancelled)} was cancelled"
+            if self.options.repair and (cancelled in self.left or cancelled in self.out.left_out):
+                self.out.left_out.pop(cancelled, None)
+                self.out.cancelled[cancelled] = self.now
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
         return left, reason
@@ -341,8 +344,8 @@ class _Run:
 
     def _reachable_again(self) -> list[int]:
         """Return the goals that no tether reached, and one does now."""
-        away = [g for g in self.unreachable if g in self.out.left_out]
-        restored = split_reachable(self.problem, away)[0] if away else []
+        unreached = [g for g in self.unreachable if g in self.out.left_out]
+        restored = split_reachable(self.problem, unreached)[0] if unreached else []
         self.unreachable -= set(restored)
         return restored
 
@@ -354,7 +357,8 @@ class _Run:
             self.problem = self.out.problem = problem
             self.out.left_out[len(problem.goals) - 1] = "was added after the end"
 
-    def _from_here(self) -> list[Leg]:
+    def _legs_from_here(self) -> list[Leg]:
+        """Return the legs that are left, the first from the position of the vehicle."""
         first = self.legs[0]
         path = np.vstack([self.vehicle.position, self.path])
         return [Leg(first.goal, path, first.word, first.tether), *self.legs[1:]]
@@ -380,8 +384,8 @@ class _Run:
         """Carry the robot off, as far as there is water."""
         start = self.vehicle.position
         # longer pushes than twice the tether have no effect
-        far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
-        by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
+        max_distance = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
+        by = by * min(1.0, max_distance / max(float(np.linalg.norm(by)), 1e-300))
         points = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
         for point in points:
             if float(self.world.field.distance(point)) < 0.0:
@@ -415,12 +419,12 @@ class _Run:
             self.retreat = None
             self._replan(why, left, event)
             return
-        out = self.tether.length
+        tether_out = self.tether.length
         # a vehicle with dynamics stops anywhere within its reach of a target
-        near = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
-        length = max(min(limit, self.problem.tether_length - near), 0.0)
+        reach = 0.0 if self.options.vehicle == "kinematic" else self.options.reach
+        retreat_length = max(min(limit, self.problem.tether_length - reach), 0.0)
         retreat_path = np.ascontiguousarray(self.tether.nodes[::-1])
-        self.retreat = _Retreat(length, why, left, event)
+        self.retreat = _Retreat(retreat_length, why, left, event)
         # lead to the base and stop on the way: a vehicle slows down before the end of its path
         self.legs = [Leg(HOME, retreat_path, (), 0.0)]
         self.path, self.fresh, self.leg_s = retreat_path[1:], True, 0.0
@@ -428,8 +432,8 @@ class _Run:
         self._log_event(
             event,
             "shorten",
-            f"{out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back along it "
-            f"to {length:.4g} {units}",
+            f"{tether_out:.4g} of {self.problem.tether_length:g} {units} of tether are out: back "
+            f"along it to {retreat_length:.4g} {units}",
             0.0,
         )
 
@@ -439,14 +443,14 @@ class _Run:
             self.live.hold()
             line = np.array([self.tether.robot, self.vehicle.position])
             self._follow(polylines.dense(line, 0.5 * self.delta)[1:])
-        made = self._repair_or_return(why, left)
-        self._log_event(event, made.kind, made.reason, made.planning_s)
+        repaired = self._repair_or_return(why, left)
+        self._log_event(event, repaired.kind, repaired.reason, repaired.planning_s)
         self._hold(self.options.planning_limit)
-        self.legs = made.legs
-        for goal, reason in made.left_out:
+        self.legs = repaired.legs
+        for goal, reason in repaired.left_out:
             self.out.left_out[goal] = reason
-        if made.kind != "defect":
-            self.unreachable |= {goal for goal, _ in made.left_out}
+        if repaired.kind != "defect":
+            self.unreachable |= {goal for goal, _ in repaired.left_out}
         self._next()
 
     def _repair_or_return(self, why: str, left: list[int]) -> Repair:
@@ -457,16 +461,18 @@ class _Run:
         """
         begin, options = time.perf_counter(), self.options
         policy = replace(self.policy.repair, time_limit_s=options.planning_limit)
-        how = RepairOptions(options.speed, options.seed, self.reserve, policy)
+        repair_options = RepairOptions(options.speed, options.seed, self.reserve, policy)
         try:
-            return repair(self.problem, self.vehicle.position, self.tether.nodes, left, why, how)
+            return repair(
+                self.problem, self.vehicle.position, self.tether.nodes, left, why, repair_options
+            )
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
             home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
-            what = f"{type(error).__name__}: {error}"
-            left_out = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
-            reason = f"{why}; a defect of netsp ended planning ({what})"
+            cause = f"{type(error).__name__}: {error}"
+            left_out = tuple((g, f"a defect of netsp ended planning ({cause})") for g in left)
+            reason = f"{why}; a defect of netsp ended planning ({cause})"
             spent = time.perf_counter() - begin
             return Repair("defect", reason, [home], left_out, home.length, spent)
 
@@ -594,9 +600,9 @@ def _check(
     _check_numbers(options)
     if solution.status is Status.INVALID or solution.length is None:
         raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
-    judged = None if is_resumed else verify(problem, solution)
-    if judged is not None and not judged:
-        failed = next(c for c in judged.checks if not c.passed)
+    verdict = None if is_resumed else verify(problem, solution)
+    if verdict is not None and not verdict:
+        failed = next(c for c in verdict.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
     surprises.check(problem)
     coarsest = coarsest_delta(problem)

@@ -93,26 +93,26 @@ def plan_fault(
     tethers = TautPaths(
         rest, RoadmapPolicy().max_state_ratio * max(problem.tether_length, polylines.length(tether))
     )
-    now: list[Leg] = []
+    present_legs: list[Leg] = []
     for k, leg in enumerate(legs):
         word = concatenate(word, crossings(leg.path[:, :2], rays))
         if leg.goal == HOME:
-            now.append(leg)
+            present_legs.append(leg)
             break
         try:
             needs = tethers.length(0, k + 1, word)
         except NetspError:
             return f"no tether of the planned class reaches {_label(problem, leg)}", legs
         if needs > longest + tethers.margin:
-            what = "be over the limit"
+            fault = "be over the limit"
             if needs <= problem.tether_length + tethers.margin and limit is not None:
-                what = f"leave less than {limit.reserve:.4g} {problem.units} in reserve"
+                fault = f"leave less than {limit.reserve:.4g} {problem.units} in reserve"
             return (
-                f"the tether would {what} at {_label(problem, leg)}: {needs:.6g} of "
+                f"the tether would {fault} at {_label(problem, leg)}: {needs:.6g} of "
                 f"{problem.tether_length:g} {problem.units}"
             ), legs
-        now.append(Leg(leg.goal, leg.path, word, needs))
-    return ("the tether would not be free at the base", legs) if word else (None, now)
+        present_legs.append(Leg(leg.goal, leg.path, word, needs))
+    return ("the tether would not be free at the base", legs) if word else (None, present_legs)
 
 
 def _label(problem: Problem, leg: Leg) -> str:
@@ -122,16 +122,16 @@ def _label(problem: Problem, leg: Leg) -> str:
 def _blocking_obstacle(problem: Problem, path: Floats) -> int | None:
     """Return an obstacle, grown by the clearance, that a path enters; None if there is none."""
     line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
-    place = 1e-6 * problem.scale
+    tolerance = 1e-6 * problem.scale
     for i, o in enumerate(problem.obstacles):
         if isinstance(o, Circle):
             room = line.distance(shapely.Point(o.center)) - o.radius
         else:
             shape = shapely.Polygon(o.polygon)
             room = line.distance(shape)
-            if shape.buffer(-place, join_style="mitre").intersects(line):
+            if shape.buffer(-tolerance, join_style="mitre").intersects(line):
                 room = -np.inf
-        if room < problem.clearance - place:
+        if room < problem.clearance - tolerance:
             return i
     return None
 
@@ -177,14 +177,14 @@ def repair(
     """
     with until_interrupt(options.policy.time_limit_s) as clock:
         try:
-            made = _repaired(problem, robot, tether, left, why, options, clock)
+            repaired = _repaired(problem, robot, tether, left, why, options, clock)
         except NetspError:
             if clock.is_stopped:
                 raise KeyboardInterrupt from None
             raise
         if clock.is_stopped:
             raise KeyboardInterrupt
-        return made
+        return repaired
 
 
 def _repaired(
@@ -211,12 +211,12 @@ def _repaired(
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None
-    new, words = _better_order(problem, graph, local, len(order), options, clock)
-    kind, chosen = choose_repair(local, lambda: new, HOMEWARD)
+    new_order, words = _better_order(problem, graph, local, len(order), options, clock)
+    kind, chosen = choose_repair(local, lambda: new_order, HOMEWARD)
     assert chosen is not None
     reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order, {words}"
-    if kept := reserved.describe(problem):
-        reason += f"; {kept}"
+    if reserve_note := reserved.describe(problem):
+        reason += f"; {reserve_note}"
     solution = to_solution(rest, graph, chosen, "auto", options.seed)
     legs = legs_of(rest, solution, order)
     return Repair(
@@ -235,7 +235,7 @@ def _better_order(
     """Return a tour that saves more time than planning it takes, None if there is none, and words
     for the log."""
     assert local.length is not None
-    speed, hurried = options.speed, clock.left <= 0.0
+    speed, is_time_up = options.speed, clock.left <= 0.0
     # a new order must save more time than its planning takes
     replan_s = max(clock.left, 0.0)
     saving = (local.length - _lower_bound_of_rest(graph, goals, clock)) / speed
@@ -243,16 +243,16 @@ def _better_order(
         found = solve_graph(
             graph, "auto", time_limit=clock, seed=options.seed, warm_start=local.tour
         )
-        worthwhile = local.length - speed * replan_s
-        if found.length is not None and found.length < worthwhile:
+        max_length = local.length - speed * replan_s
+        if found.length is not None and found.length < max_length:
             return found, f"{found.length:.4g} {problem.units} in a new one"
-        if found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= worthwhile:
+        if found.status is Status.OPTIMAL or (found.lower_bound or 0.0) >= max_length:
             return None, "a new order would not save enough"
         return None, (
             "no new order that saves enough was found within the time limit of planning; a "
             "longer limit (--planning-limit) may find one"
         )
-    if hurried:
+    if is_time_up:
         return None, (
             "as far as planning came within its time limit; no new order was tried, and a longer "
             "limit (--planning-limit) may find a shorter way"
@@ -269,22 +269,22 @@ def reserved_limit(problem: Problem, goals: list[int], reserve: float) -> Reserv
     goals
         Goals to be visited; unreachable ones do not count.
     """
-    all_of_it = ReservedLimit(problem.tether_length, 0.0, reserve)
+    whole_tether = ReservedLimit(problem.tether_length, 0.0, reserve)
     if reserve <= 0.0:
-        return all_of_it
+        return whole_tether
     goals = _in_free_water(problem, goals)[0]
     if not goals:
-        return all_of_it
-    paths, needs = _shortest_tethers(problem, goals)
-    within = [k for k in range(len(goals)) if needs[k] <= problem.tether_length + paths.margin]
-    far = max(within, key=lambda k: float(needs[k]), default=None)
+        return whole_tether
+    paths, needed = _shortest_tethers(problem, goals)
+    reached = [k for k in range(len(goals)) if needed[k] <= problem.tether_length + paths.margin]
+    farthest = max(reached, key=lambda k: float(needed[k]), default=None)
     length = problem.tether_length - reserve
-    if length > paths.margin and (far is None or needs[far] <= length + paths.margin):
+    if length > paths.margin and (farthest is None or needed[farthest] <= length + paths.margin):
         return ReservedLimit(length, reserve, reserve)
-    if far is None:
-        return all_of_it
-    length = min(float(needs[far]), problem.tether_length)
-    return ReservedLimit(length, problem.tether_length - length, reserve, goals[far])
+    if farthest is None:
+        return whole_tether
+    length = min(float(needed[farthest]), problem.tether_length)
+    return ReservedLimit(length, problem.tether_length - length, reserve, goals[farthest])
 
 
 def _shortest_tethers(problem: Problem, goals: list[int]) -> tuple[TautPaths, Floats]:
@@ -303,13 +303,13 @@ def split_reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[
     order, left_out = _in_free_water(problem, left)
     if not order:
         return order, left_out
-    paths, needs = _shortest_tethers(problem, order)
-    plain = paths.problem
-    beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
-    for k in beyond:
-        why = unreached_message(plain, paths.outline, [k + 1])
-        left_out.append((order[k], why.removeprefix(f"{plain.goal_label(k)} ")))
-    return [g for k, g in enumerate(order) if k not in beyond], left_out
+    paths, needed = _shortest_tethers(problem, order)
+    problem_of_goals = paths.problem
+    unreached = [k for k in range(len(order)) if needed[k] > problem.tether_length + paths.margin]
+    for k in unreached:
+        why = unreached_message(problem_of_goals, paths.outline, [k + 1])
+        left_out.append((order[k], why.removeprefix(f"{problem_of_goals.goal_label(k)} ")))
+    return [g for k, g in enumerate(order) if k not in unreached], left_out
 
 
 def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Problem:
@@ -319,20 +319,20 @@ def _rest(problem: Problem, order: list[int], state: State, limit: float) -> Pro
 
 def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
     """Return the goals in free water, and those on which an obstacle stands."""
-    kept: list[int] = []
-    gone: list[tuple[int, str]] = []
+    free: list[int] = []
+    blocked: list[tuple[int, str]] = []
     for g in order:
         xy = np.array(problem.goals[g].position[:2])
-        on = [
+        blocking = [
             i
             for i, o in enumerate(problem.obstacles)
             if float(o.signed_distance(xy)) < problem.clearance - problem.tolerance
         ]
-        if on:
-            gone.append((g, f"{problem.obstacle_label(on[0])} stands on it"))
+        if blocking:
+            blocked.append((g, f"{problem.obstacle_label(blocking[0])} stands on it"))
         else:
-            kept.append(g)
-    return kept, gone
+            free.append(g)
+    return free, blocked
 
 
 def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg, str]:
@@ -363,20 +363,20 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
     layers: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
     for c in range(1, goals + 1):
         members = graph.members(c)
-        both = np.concatenate([vertices, members])
-        is_needed = np.zeros((len(both), len(both)), dtype=bool)
+        ends = np.concatenate([vertices, members])
+        is_needed = np.zeros((len(ends), len(ends)), dtype=bool)
         is_needed[: len(vertices), len(vertices) :] = is_needed[
             len(vertices) :, : len(vertices)
         ] = True
         try:
-            legs = graph.within.costs_among(both, is_needed)
+            legs = graph.within.costs_among(ends, is_needed)
         except LimitReachedError:
             best_so_far, shortest = int(lengths.argmin()), int(graph.tethers[members].argmin())
             members = members[[shortest]]
             with graph.within.on_clock(None):
-                d = graph.within.costs_among([vertices[best_so_far], members[0]])[0, 1]
+                leg_length = graph.within.costs_among([vertices[best_so_far], members[0]])[0, 1]
             layers.append((members, np.array([best_so_far])))
-            lengths, vertices = lengths[[best_so_far]] + d, members
+            lengths, vertices = lengths[[best_so_far]] + leg_length, members
             continue
         total = lengths[:, None] + legs[: len(vertices), len(vertices) :]
         best = total.argmin(axis=0)
@@ -409,11 +409,11 @@ def _lower_bound_of_rest(graph: GraphFromState, goals: int, clock: Clock) -> flo
         is_member = cluster == c
         if not is_member.any():
             continue
-        nearest = [
+        cheapest = [
             float(bounds[np.ix_(is_member, cluster == other)].min())
             for other in range(goals + 2)
             if other != c and (cluster == other).any() and {c, other} != set(ends)
         ]
-        nearest.sort()
-        total += sum(nearest[: 1 if c in ends else 2])
+        cheapest.sort()
+        total += sum(cheapest[: 1 if c in ends else 2])
     return 0.5 * total
