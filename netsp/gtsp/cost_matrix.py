@@ -26,7 +26,7 @@ from netsp.gtsp.sparse_costs import SparseCosts
 from netsp.gtsp.travel.costs import rounded_down
 
 NO_VALUES: Floats = np.zeros((0, 0), dtype=np.float32)  # type: ignore[assignment]
-"""Matrix where costs are sparse."""
+"""Empty matrix of values, used while costs are sparse."""
 
 
 class CostMatrix:
@@ -146,7 +146,7 @@ class CostMatrix:
         return np.asarray(self.values[np.ix_(rows, rows)], dtype=np.float64)
 
     def nearest_among(self, rows: Ints) -> Ints:
-        """Return which of some rows is nearest to each of the k rows, fixed out or not."""
+        """Return which of some rows is nearest to each of the k rows, by legs fixed out, too."""
         if self.rows is None:
             return np.asarray(np.argmin(self.values[:, rows], axis=1))
         return self._near.nearest(self.vertices, rows)

@@ -61,8 +61,8 @@ class CostOracle(ABC):
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """Return lower bounds (k, k), much cheaper than costs; with `rows`, only those from some
-        vertices (positions among them)."""
+        """Return lower bounds (k, k) on the costs, which take far less time than the costs; with
+        `rows`, only bounds from some vertices (positions among them)."""
 
     def estimate(self, k: int) -> Estimate:
         """Return the estimate for measuring all legs among k vertices: here, one by one."""
@@ -124,5 +124,5 @@ class MatrixCosts(CostOracle):
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """Return the costs themselves."""
+        """Return the costs, which are known, as bounds on themselves."""
         return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]

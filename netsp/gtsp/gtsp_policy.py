@@ -36,7 +36,7 @@ class CostPolicy:
         Memory of a proof for each entry of a matrix in double precision, bytes: the cost, what is
         known of the leg, and temporaries.
     bytes_per_rounded_leg
-        Same in single precision.
+        Memory of a proof for each entry of a matrix in single precision, bytes.
     block_rows
         Rows of a matrix that are processed at a time; more rows take more memory.
     block_legs
@@ -91,8 +91,8 @@ class LocalSearchPolicy:
     ruined_neighbours
         Number of nearest clusters of a seed around which strings may be removed.
     first_temperature, last_temperature
-        Temperatures of the acceptance, in mean legs of the tour. With a tenth of the first, most
-        starts end in the same poor tour, with few rounds and with many.
+        Temperatures of the acceptance, in mean legs of the tour. With a tenth of the default for
+        the first, most starts end in the same poor tour, however many rounds they have.
     temperature_steps
         Number of temperatures from first to last if the number of rounds is limited.
     min_chunk_s
@@ -194,7 +194,7 @@ class ProofSearchPolicy:
         Number of vertices, as a multiple of the core's, above which the core is proven first. Below
         it the core costs more than it saves, and shows no bound meanwhile.
     min_core_ratio_many
-        Same from `many_goals` on, where the core pays sooner.
+        Value of `min_core_ratio` from `many_goals` goals on, where the core pays sooner.
     many_goals
         Number of goals from which on `min_core_ratio_many` holds.
     """
@@ -248,10 +248,10 @@ class WalkPolicy:
     remembered_goals
         Number of goals that each goal remembers at first, itself among them.
     stall_passes
-        Passes that must together close the share `min_progress` of the gap, or eliminate it of the
-        states; else the walks end.
+        Passes that must together close the share `min_progress` of the gap, or eliminate that share
+        of the states; otherwise the walks end.
     min_progress
-        That share.
+        Share of the gap, or of the states, that counts as progress.
     max_kept_share
         Vertices without a state are removed when at most this share of all is left.
     max_table_cells

@@ -67,14 +67,14 @@ class Instance:
         Clock that ends the measuring of legs.
     before : ndarray of bool, shape (c + 1, c + 1)
         Whether a cluster must be visited before another, transitively closed; shape (0, 0) for
-        none. With any, a tour means what it says only from its first vertex on.
+        none. With precedences, a tour counts from its first vertex on, in its direction.
     grain : float
         Lengths of tours are multiples of it; 0 where they may be anything.
     bound_in_any_class : float
         Lower bound that also holds for tours through vertices left out of the instance; 0 while
         nothing is known.
     declared_scope : Scope or None
-        Tours that the instance holds, where its maker knows.
+        Scope that the creator of the instance states for its tours; None if it states none.
     distance_oracle : DistanceOracle or None
         Lower bounds between clusters; None to find them from a matrix of costs.
     parity_oracle : ParityOracle or None
@@ -247,12 +247,12 @@ class Instance:
         Returns
         -------
         ndarray of float32, shape (k, k)
-            No cost is larger than that of the leg; inf within a cluster.
+            Costs, none above the cost of its leg; inf within a cluster.
 
         Raises
         ------
         LimitReachedError
-            The clock was up before they were found.
+            The clock was up before they were measured.
         """
         chosen = np.asarray(vertices, dtype=np.int64)
         if self._costs is not None:
@@ -263,26 +263,26 @@ class Instance:
     def costs_in_blocks(
         self, vertices: npt.ArrayLike | None = None, rows: Ints | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
-        """Yield costs of legs in single precision, those of some vertices at a time.
+        """Yield costs of legs in single precision, the rows of some vertices at a time.
 
         Parameters
         ----------
         vertices : array_like of int, shape (k,), optional
-            The vertices among which; all of them by default.
+            Vertices between which legs are measured; by default all.
         rows : ndarray of int, shape (m,), optional
-            Of which of them, as positions among them, no two alike; of each by default.
+            Distinct positions among the vertices whose rows are yielded; by default all.
 
         Yields
         ------
         positions : ndarray of int, shape (r,)
-            Some of these; every one comes once.
+            Positions whose rows are in this block; each position comes once.
         costs : ndarray of float32, shape (r, k)
-            Of their legs, as of `costs_rounded`; to be used before the next are asked for.
+            Their rows, rounded down as in `costs_rounded`; valid until the next block.
 
         Raises
         ------
         LimitReachedError
-            The clock was up before they were found.
+            The clock was up before they were measured.
         """
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
         blocks = self.oracle.blocks(chosen, rows, self.clock)
@@ -361,12 +361,13 @@ class Instance:
         Parameters
         ----------
         is_up : callable
-            Whether the time is up.
+            Returns whether the time is up.
 
         Returns
         -------
         ndarray, shape (n + 1, n + 1)
-            No more than any leg between two goals, or base and goal; 0 where nothing is known.
+            At most the cost of any leg between two goals, or between base and goal; 0 where nothing
+            is known.
         """
         if self.distance_oracle is not None:
             return self.distance_oracle(is_up)
@@ -448,7 +449,7 @@ class Instance:
         return self.why_no_tour(tour) is None
 
     def why_no_tour(self, tour: Sequence[int]) -> str | None:
-        """Return the first reason why vertices are no tour as of `is_tour`; None for a tour."""
+        """Return the first reason why vertices are no tour (`is_tour`); None for a tour."""
         t = [int(v) for v in tour]
         if not t or t[0] != 0:
             return "it does not begin at vertex 0"
@@ -559,7 +560,7 @@ class PartCosts(CostOracle):
         self.whole, self.chosen = whole, chosen
 
     def estimate(self, k: int) -> Estimate:
-        """Return the estimate of the whole, or that for legs one by one if it is shorter."""
+        """Return the estimate of the whole instance, or that of single legs if it is shorter."""
         return min(self.whole.oracle.estimate(k), super().estimate(k))
 
     @contextmanager
@@ -582,7 +583,7 @@ class PartCosts(CostOracle):
     def blocks(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
-        """Yield blocks of the whole."""
+        """Yield blocks of costs of the whole instance."""
         with self._on_clock(clock) as whole:
             yield from whole.costs_in_blocks(self.chosen[vertices], rows)
 
@@ -597,7 +598,7 @@ class PartCosts(CostOracle):
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
-        """Return the bounds of the whole."""
+        """Return the bounds that the whole instance gives."""
         with self._on_clock(clock) as whole:
             return whole.lower_bounds(self.chosen[vertices], rows)
 
@@ -623,7 +624,7 @@ class BaselessInstance(Instance):
 
     @property
     def roots(self) -> Ints:
-        """Vertices of the smallest cluster, the first of those."""
+        """Vertices of the smallest cluster; of clusters of equal size, the first one."""
         return self.members(int(np.argmin(np.bincount(self.cluster))))
 
     @property
@@ -652,9 +653,9 @@ class BaselessInstance(Instance):
         Returns
         -------
         instance : Instance
-            The root is its base; the other vertices of that cluster are left out.
+            Instance whose base is the root, without the other vertices of the root's cluster.
         vertices : ndarray of int
-            What its vertices are here.
+            Vertex of this graph for each vertex of the instance.
         """
         root_cluster = int(self.cluster[root])
         vertices = np.r_[root, np.flatnonzero(self.cluster != root_cluster)]

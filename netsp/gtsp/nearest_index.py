@@ -1,8 +1,9 @@
-"""Nearest vertices among a few, where most legs are not held.
+"""Index of the nearest of a few vertices, where sparse costs lack most legs.
 
-A cut comes to lie on one side or the other of a vertex by which of the visited vertices it is
-nearest to. Legs that are in no better tour decide that as well as others, and without them cuts are
-much weaker. So these legs are found again, and kept as long as the same vertices are visited.
+Cuts over the visited vertices are extended to all vertices: each vertex joins the side of the
+visited vertex nearest to it. Legs that have been fixed out count here like any others; without them
+cuts are much weaker. So these legs are measured again, and kept as long as the same vertices are
+visited.
 """
 
 from __future__ import annotations

@@ -37,15 +37,15 @@ def cheapest_insertions(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, coun
     t = np.asarray(tour, dtype=np.int64)
     after = np.roll(np.arange(len(t)), -1)
     legs = bounds[np.arange(len(t)), t[after]]
-    longer = np.full(len(cluster), np.inf)
+    increase = np.full(len(cluster), np.inf)
     for k in range(len(t)):
-        np.minimum(longer, bounds[k] + bounds[after[k]] - legs[k], out=longer)
-    # instead of the tour's own vertex of the cluster
+        np.minimum(increase, bounds[k] + bounds[after[k]] - legs[k], out=increase)
+    # or in place of the tour's vertex in the same cluster
     for k in range(1, len(t)):
-        own = np.flatnonzero(cluster == cluster[t[k]])
-        instead = bounds[k - 1, own] + bounds[after[k], own] - legs[k - 1] - legs[k]
-        longer[own] = np.minimum(longer[own], instead)
-    order = np.lexsort((longer, cluster))
+        members = np.flatnonzero(cluster == cluster[t[k]])
+        instead = bounds[k - 1, members] + bounds[after[k], members] - legs[k - 1] - legs[k]
+        increase[members] = np.minimum(increase[members], instead)
+    order = np.lexsort((increase, cluster))
     first = np.searchsorted(cluster[order], cluster[order])
     return np.sort(order[np.arange(len(order)) - first < count])
 

@@ -2,7 +2,7 @@
 
 Proofs and searches of this package are written as such generators. A solver that does one thing
 after another runs them to the end (`run_to_end`); a scheduler gives each a slice of the time
-(`netsp.plan.scheduler`).
+(`netsp.gtsp.scheduler`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import TypeVar
 T = TypeVar("T")
 
 Steps = Generator[None, None, T]
-"""Steps of some work, with its result at the end. It may be resumed after each, in any state of
-what it shares with other work, such as an incumbent that has become shorter."""
+"""Generator that pauses after each step of some work and returns the result of the work. State that
+the work shares, such as the incumbent, may have changed whenever the generator is resumed."""
 
 
 def run_to_end(steps: Steps[T]) -> T:

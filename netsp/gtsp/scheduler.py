@@ -80,7 +80,7 @@ class Task:
     Attributes
     ----------
     spent : float
-        Seconds that it has had.
+        CPU time that the task has had, s.
     closed : float
         Length by which it has narrowed the gap.
     is_over : bool
@@ -107,7 +107,7 @@ class Task:
             self.is_over = True
 
     def note(self, seconds: float, before: float, gap: float, discount: float) -> None:
-        """Add a slice, with the gap before it and after."""
+        """Account for a slice of some seconds, with the gap before it and after it."""
         closed = max(before - gap, 0.0) if before < math.inf else 0.0
         self._has_succeeded |= gap < before
         self.spent += seconds
@@ -136,12 +136,12 @@ class Scheduler:
     run : SolverRun
         Run with the incumbent and the bound that all tasks share.
     tasks : sequence of Task
-        Tasks, those that find a first tour before the others; among equal promises, too, the first
-        comes first.
+        Tasks in order of priority: before the first tour they run in this order, and among equal
+        promises the first one runs.
     gap : callable
         Returns the gap, a length; inf while there is no tour.
     policy : SchedulerPolicy
-        Slices, and promises.
+        Lengths of slices, and weights of promises.
 
     Examples
     --------
@@ -205,7 +205,7 @@ class Scheduler:
             try:
                 task.advance()
             except RunStopped:
-                task.is_over = True  # an LP or a search of its own that ended
+                task.is_over = True  # an LP or a search within the task has ended
             if self.run.iteration_limit < math.inf:
                 seconds += policy.step_s
             else:

@@ -44,10 +44,10 @@ class SearchingRun(SolverRun):
     Attributes
     ----------
     gtsp_policy
-        That policy; subclasses have further ones.
+        Policy of costs, searches and the core; subclasses hold further policies.
     outer
-        For a run over a core, the run over all vertices, and the core's vertices there. Its
-        incumbent is updated with that of the core, and it reports; bounds of the core stay here.
+        For a run over a core: the run over all vertices, and the core's vertices there. That run
+        adopts the incumbents of the core and reports; bounds of the core stay here.
     local_optima
         Tours in which the last searches ended, no two the same.
     """
@@ -99,14 +99,14 @@ class SearchingRun(SolverRun):
         core = cheapest_per_cluster(
             graph.costs_to_base, graph.cluster, self.searched_classes_per_goal
         )
-        vain = 0
+        vain_searches = 0
         for _ in range(policy.max_searches):
             before = self.length
             core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
             self._search(self.instance_among(core), clock)
             self.report("begun", vertices=len(graph))
-            vain = 0 if self.length < before else vain + 1
-            if clock.is_up or self.tour is None or vain == policy.max_vain_searches:
+            vain_searches = 0 if self.length < before else vain_searches + 1
+            if clock.is_up or self.tour is None or vain_searches == policy.max_vain_searches:
                 break
             core = self.classes_near_incumbent()
         return core
@@ -196,8 +196,8 @@ class SearchingRun(SolverRun):
         graph, policy = self.graph, self.gtsp_policy
         core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, self.core_classes_per_goal)
         ratio = policy.proof_search.core_ratio(graph.goal_count)
-        few = len(graph) <= max(policy.costs.max_measured_vertices, ratio * len(core))
-        if few or graph.has_cost_matrix or self.outer is not None:
+        is_small = len(graph) <= max(policy.costs.max_measured_vertices, ratio * len(core))
+        if is_small or graph.has_cost_matrix or self.outer is not None:
             yield None
             return
         near = self.search_near_incumbent()
@@ -256,9 +256,9 @@ class SearchingRun(SolverRun):
 
     def searches_all_vertices(self, costs: CostMatrix) -> bool:
         """Return whether a search sees all remaining vertices."""
-        few = len(costs) <= self.gtsp_policy.proof_search.max_whole_search
-        few = few or self.graph.has_cost_matrix
-        return costs.exact is None and costs.rows is None and few
+        is_small = len(costs) <= self.gtsp_policy.proof_search.max_whole_search
+        is_small = is_small or self.graph.has_cost_matrix
+        return costs.exact is None and costs.rows is None and is_small
 
     def instance(self, costs: CostMatrix, more: Ints) -> LayeredInstance:
         """Return the instance that is searched.
@@ -276,16 +276,16 @@ class SearchingRun(SolverRun):
                 self._whole = len(costs), whole
             return self._whole[1]
         base_costs = costs.base_costs
-        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        tour_rows = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
         count = self.searched_classes_per_goal
         if self.tour is None:
             near = cheapest_per_cluster(base_costs, costs.cluster, count)
         else:
-            bounds = costs.lower_bounds_from(own)
+            bounds = costs.lower_bounds_from(tour_rows)
             near = classes_near_tour(
-                base_costs, costs.cluster, bounds, own, count, policy.neighbourhood
+                base_costs, costs.cluster, bounds, tour_rows, count, policy.neighbourhood
             )
-        core = np.unique(np.concatenate([near, own, more]))
+        core = np.unique(np.concatenate([near, tour_rows, more]))
         return LayeredInstance(
             costs.cluster[core],
             costs.among(core),
@@ -299,12 +299,16 @@ class SearchingRun(SolverRun):
         policy = self.gtsp_policy.proof_search
         more = np.zeros(0, dtype=np.int64) if more is None else more
         clock = self.clock.part(policy.search_time_share)
-        vain = 0
+        vain_searches = 0
         for _ in range(policy.max_searches):
             before = self.length
             self._search(self.instance(costs, more), clock, rounded=costs.rounded)
-            vain = 0 if self.length < before else vain + 1
-            if self.searches_all_vertices(costs) or clock.is_up or vain == policy.max_vain_searches:
+            vain_searches = 0 if self.length < before else vain_searches + 1
+            if (
+                self.searches_all_vertices(costs)
+                or clock.is_up
+                or vain_searches == policy.max_vain_searches
+            ):
                 break
 
     def _search(self, instance: LayeredInstance, clock: Clock, *, rounded: bool = False) -> None:

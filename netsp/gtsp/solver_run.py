@@ -170,8 +170,8 @@ class SolverRun:
         graph = self.graph
         # a clock without a limit instead of None: a subgraph would use its graph's clock for None
         with graph.on_clock(Clock()):
-            few = len(core) <= self.cost_policy.untimed_vertices
-            near = graph.costs_among(core) if few else graph.lower_bounds(core)
+            is_small = len(core) <= self.cost_policy.untimed_vertices
+            near = graph.costs_among(core) if is_small else graph.lower_bounds(core)
             tour, left = [0], np.ones(len(core), dtype=bool)
             left[0] = False
             before = np.zeros((len(core), len(core)), dtype=bool)

@@ -43,7 +43,7 @@ EMPTY_ROWS = Rows(
     np.zeros(0, dtype=np.int32),
     np.zeros(0, dtype=np.float32),  # type: ignore[arg-type]
 )
-"""Rows where costs are a matrix."""
+"""Empty rows, used while costs are a matrix."""
 
 
 class SparseCosts:
@@ -187,11 +187,11 @@ def _kept(k: int, block: Block, other: Columns, cost: Floats) -> int:
     `other` and `cost`."""
     costs, longest = block.costs[k], block.longest[block.cell[block.rows[k]]]
     before, after = block.mates[block.rows[k]]
-    top, count = longest.max(), 0
+    largest, count = longest.max(), 0
     for v in range(len(costs)):
         c = costs[v]
         # most legs are longer than any that is kept, and are passed over quickly
-        if (c <= top and c <= longest[block.cell[v]]) or v in (before, after):
+        if (c <= largest and c <= longest[block.cell[v]]) or v in (before, after):
             if c == np.inf:
                 continue
             if count < len(other):
@@ -218,7 +218,7 @@ def _keep(block: Block, begin: Ints, other: Columns, cost: Floats, first: int, l
 
 @kernel
 def place_of(u: int, v: int, rows: Rows) -> int:
-    """Return the place of a leg; -1 if it is fixed out."""
+    """Return the index of a leg in `rows.other`; -1 if it is fixed out."""
     low, high = rows.first[u], rows.first[u] + rows.size[u]
     end = high
     while low < high:

@@ -108,7 +108,7 @@ def walk_steps(
     walks = Walks(costs.cluster, costs.values, run.clock.flag, before, policy)
     prices = initial_prices(run, costs)
     direction: Floats = np.zeros(walks.n + 1)
-    best, kept, step, vain = -np.inf, prices, policy.first_step, 0
+    best_bound, best_prices, step, vain_passes = -np.inf, prices, policy.first_step, 0
     history: list[tuple[float, int]] = []
     searched = run.searches_all_vertices(costs)
     while not run.is_done:
@@ -125,10 +125,10 @@ def walk_steps(
         run.raise_bound(min(walk.bound, cutoff))
         goals = costs.cluster[walk.rows]
         visits = np.bincount(goals, minlength=walks.n + 1)
-        once = bool((visits[1:] == 1).all())
-        whole = once and respects_precedences(goals.tolist(), before)
-        if whole:
-            measured = costs.exact is None
+        visits_each_once = bool((visits[1:] == 1).all())
+        is_tour = visits_each_once and respects_precedences(goals.tolist(), before)
+        if is_tour:
+            was_measured = costs.exact is None
             costs.measure(np.concatenate([[0], walk.rows]))
             run.update_incumbent([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
@@ -137,30 +137,30 @@ def walk_steps(
             run.search(costs)
             searched = True
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
-        if whole:
-            if measured and not run.is_done:
-                return  # only rounding is missing, which no price can mend
-            best = -np.inf  # its legs are longer now
+        if is_tour:
+            if was_measured and not run.is_done:
+                return  # only rounding keeps the bound below the length, whatever the prices
+            best_bound = -np.inf  # legs of the walk became longer when they were measured
             continue
-        if walk.bound > best:
-            best, kept, vain = walk.bound, prices, 0
+        if walk.bound > best_bound:
+            best_bound, best_prices, vain_passes = walk.bound, prices, 0
         else:
-            vain += 1
-            if vain % policy.patience == 0:
-                step, prices = step * policy.step_decay, kept
-        history.append((best, int(walks.alive.sum())))
+            vain_passes += 1
+            if vain_passes % policy.patience == 0:
+                step, prices = step * policy.step_decay, best_prices
+        history.append((best_bound, int(walks.alive.sum())))
         stalls = _stalls(history, run.length, policy)
         if costs.exact is not None and (stalls or len(costs) <= costs.policy.max_measured_vertices):
             _measure(run, walks, costs)
             searched = run.searches_all_vertices(costs)
-            best, step = -np.inf, policy.first_step
+            best_bound, step = -np.inf, policy.first_step
             history.clear()
         elif stalls:
             return
         if costs.exact is None and handover.is_due(len(costs), walk.labels):
             return
         widened = walk.labels < policy.max_widened_labels and walks.memory.widen(goals.tolist())
-        if once:  # in an order that breaks a precedence, which prices cannot mend
+        if visits_each_once:  # in an order that breaks a precedence, which prices cannot mend
             if not widened:
                 return
             continue
@@ -176,7 +176,7 @@ def walk_steps(
 def initial_prices(run: SearchingRun, costs: CostMatrix) -> Floats:
     """Return prices (n + 1,): half the sum of the incumbent's two legs at each goal.
 
-    They pay for its legs, except for half of those of the base.
+    They sum to the length of the incumbent, less half of its two legs at the base.
     """
     prices = np.zeros(run.graph.goal_count + 1)
     if run.tour is not None:

@@ -127,26 +127,26 @@ def _completions_in_numpy(
         for h in range(1, n + 1):
             if stop[0] != 0:
                 return
-            own = slice(start[h], start[h + 1])
-            is_back = before[k, own, None] == goal
-            cost = np.where(is_back, second[k, own, None], lowest[k, own, None])
-            onward[k, h] = np.fmin.reduce(cost + costs[own], axis=0, initial=np.inf)
-            onward[k, h, own] = np.inf
+            members = slice(start[h], start[h + 1])
+            is_return = before[k, members, None] == goal
+            cost = np.where(is_return, second[k, members, None], lowest[k, members, None])
+            onward[k, h] = np.fmin.reduce(cost + costs[members], axis=0, initial=np.inf)
+            onward[k, h, members] = np.inf
         if k == n:
             break
         by_goal = onward[k, 1:]
         last, ascending = by_goal.argmin(axis=0) + 1, np.sort(by_goal, axis=0)
-        best, other = ascending[0], ascending[1] if n > 1 else np.full(len(goal), np.inf)
-        here = alive[k + 1].copy()
-        here[0] = False
-        lowest[k + 1, here] = (best - prices[goal])[here]
-        second[k + 1, here] = (other - prices[goal])[here]
-        before[k + 1, here] = np.where(best < np.inf, last, -1)[here]
+        best, second_best = ascending[0], ascending[1] if n > 1 else np.full(len(goal), np.inf)
+        is_alive = alive[k + 1].copy()
+        is_alive[0] = False
+        lowest[k + 1, is_alive] = (best - prices[goal])[is_alive]
+        second[k + 1, is_alive] = (second_best - prices[goal])[is_alive]
+        before[k + 1, is_alive] = np.where(best < np.inf, last, -1)[is_alive]
 
 
 @kernel
 def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int:
-    """Return the memory at goal h of a walk that comes from goal g; negative if it must not."""
+    """Return the memory at goal h of a walk that comes from goal g; negative if h is forbidden."""
     mask: int = (
         tables[g, h, 0, memory & TABLE_MASK]
         | tables[g, h, 1, (memory >> BITS_PER_TABLE) & TABLE_MASK]
@@ -169,9 +169,9 @@ def extend(
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
     """Return the labels of the next layer at goals first to last - 1.
 
-    A label is kept if none costs less and remembers no more. Some are missing once the clock's flag
-    `stop` is set. The tables of `translate` are passed by themselves, because each call of it would
-    count references of a tuple, a twelfth of the time.
+    A label is dropped if a cheaper label of its vertex remembers a subset of its goals. Some labels
+    are missing once the clock's flag `stop` is set. The tables of `translate` are an argument of
+    their own: within a tuple, each call would count references, which takes a twelfth of the time.
     """
     costs, start = graph.costs, graph.start
     pointer, cost, memory = labels.pointer, labels.cost, labels.memory
@@ -180,12 +180,12 @@ def extend(
     room, used_up = 1024, 0
     out_cost, out_memory = np.empty(room), np.empty(room, dtype=np.int32)
     out_pointer = np.zeros(start[last] - start[first] + 1, dtype=np.int64)
-    widest = 0
+    max_bits = 0
     for h in range(first, last):
-        widest = max(widest, bits[h])
-    slot = np.full(1 << widest, -1, dtype=np.int32)
-    seen = np.empty(1 << widest, dtype=np.int32)
-    found_cost, found_memory = np.empty(1 << widest), np.empty(1 << widest, dtype=np.int32)
+        max_bits = max(max_bits, bits[h])
+    slot = np.full(1 << max_bits, -1, dtype=np.int32)
+    seen = np.empty(1 << max_bits, dtype=np.int32)
+    found_cost, found_memory = np.empty(1 << max_bits), np.empty(1 << max_bits, dtype=np.int32)
     table_room = 1 << 14
     table = np.empty(table_room)
     for h in range(first, last):
@@ -200,11 +200,11 @@ def extend(
             if stop[0] != 0:
                 break
             for u in range(start[g], start[g + 1]):
-                most = cut - onward[h, u]
+                max_cost = cut - onward[h, u]
                 leg = costs[u, begin : begin + size]
                 for label in range(pointer[u], pointer[u + 1]):
                     d = cost[label]
-                    if d > most:
+                    if d > max_cost:
                         break
                     m = translate(tables, g, h, memory[label])
                     if m < 0:
@@ -215,9 +215,9 @@ def extend(
                         slot[m], seen[s] = s, m
                         slots += 1
                         if slots * size > table_room:
-                            bigger = np.empty(2 * slots * size)
-                            write_floats(bigger, table, table_room)
-                            table, table_room = bigger, len(bigger)
+                            new_table = np.empty(2 * slots * size)
+                            write_floats(new_table, table, table_room)
+                            table, table_room = new_table, len(new_table)
                         table[s * size : slots * size] = np.inf
                     row = table[s * size : (s + 1) * size]
                     for j in range(size):
@@ -234,11 +234,11 @@ def extend(
                     found += 1
             if found == 0:
                 continue
-            own = used_up
+            first_kept = used_up
             for i in order_of(found_cost[:found]):
                 m = found_memory[i]
                 dominated = False
-                for label in range(own, used_up):
+                for label in range(first_kept, used_up):
                     if out_memory[label] & m == out_memory[label]:
                         dominated = True
                         break
@@ -278,15 +278,15 @@ def _extend_in_numpy(
     slot = np.empty(1 << int(bits[first:last].max(initial=0)), dtype=np.int64)
     out_pointer, out_cost, out_memory = [0], [np.zeros(0)], [np.zeros(0, dtype=np.int32)]
     for h in range(first, last):
-        own = slice(start[h], start[h + 1])
-        is_dear = cost > (bounds.cut - bounds.onward[h])[vertex]
-        at = np.flatnonzero(~is_dear & (from_goal != h))
+        members = slice(start[h], start[h + 1])
+        is_too_costly = cost > (bounds.cut - bounds.onward[h])[vertex]
+        at = np.flatnonzero(~is_too_costly & (from_goal != h))
         if stop[0] != 0:
             at = at[:0]
         masks = _translated(tables, from_goal[at], h, memory[at])
         at, masks = at[masks >= 0], masks[masks >= 0]
-        if not len(at) or own.start == own.stop:
-            out_pointer += [out_pointer[-1]] * (own.stop - own.start)
+        if not len(at) or members.start == members.stop:
+            out_pointer += [out_pointer[-1]] * (members.stop - members.start)
             continue
         # distinct memories, in the order in which `extend` finds them, which breaks ties
         place = np.arange(len(at))
@@ -297,8 +297,8 @@ def _extend_in_numpy(
         by_kind = np.argsort(kind, kind="stable")
         begin = np.searchsorted(kind[by_kind], place[: len(seen)])
         at = at[by_kind]
-        table = np.minimum.reduceat(cost[at, None] + costs[vertex[at], own], begin, axis=0)
-        table[~((table <= bounds.limit[own]) & (table < np.inf))] = np.inf
+        table = np.minimum.reduceat(cost[at, None] + costs[vertex[at], members], begin, axis=0)
+        table[~((table <= bounds.limit[members]) & (table < np.inf))] = np.inf
         # for each vertex of the goal, indices into `seen`, cheapest first
         count = np.count_nonzero(table < np.inf, axis=0)
         order = np.argsort(table.T, axis=1, kind="stable")[:, : count.max()]
@@ -356,8 +356,8 @@ def _undominated_of(memory: npt.NDArray[np.int32], block_size: int = 32) -> Bool
     kept, left = np.zeros(len(memory), dtype=bool), np.arange(len(memory))
     while len(left):
         block, left = left[:block_size], left[block_size:]
-        own = memory[block, None]
-        block = block[~np.triu((own & own.T) == own, 1).any(axis=0)]
+        masks = memory[block, None]
+        block = block[~np.triu((masks & masks.T) == masks, 1).any(axis=0)]
         kept[block] = True
         left = left[~((memory[left, None] & memory[block]) == memory[block]).any(axis=1)]
     return kept
@@ -401,16 +401,16 @@ def _join_in_lists(goal: Ints, prices: Floats, a: Labels, b: Labels) -> Floats:
         low, high = b_pointer[v], b_pointer[v + 1]
         if low == high:
             continue
-        others = list(zip(b_cost[low:high], b_memory[low:high], strict=True))
-        own = slice(a_pointer[v], a_pointer[v + 1])
-        for cost, memory in zip(a_cost[own], a_memory[own], strict=True):
+        second_parts = list(zip(b_cost[low:high], b_memory[low:high], strict=True))
+        labels_at_v = slice(a_pointer[v], a_pointer[v + 1])
+        for cost, memory in zip(a_cost[labels_at_v], a_memory[labels_at_v], strict=True):
             if cost + b_cost[low] >= best:
                 break
-            for other, mask in others:
-                if cost + other >= best:
+            for second_cost, second_memory in second_parts:
+                if cost + second_cost >= best:
                     break
-                if memory & mask == 1:
-                    best = cost + other
+                if memory & second_memory == 1:
+                    best = cost + second_cost
                     break
         out[v] = best + prices[goal[v]]
     return out
@@ -429,7 +429,7 @@ def step_back(
     """Return the vertex and label, in the layer before, that a label at v came from."""
     costs, goal = graph.costs, graph.goal
     pointer, cost, memory = labels.pointer, labels.cost, labels.memory
-    off, from_vertex, from_label = np.inf, -1, -1
+    min_error, from_vertex, from_label = np.inf, -1, -1
     h = goal[v]
     for u in range(1, len(goal)):
         g = goal[u]
@@ -438,9 +438,9 @@ def step_back(
         for label in range(pointer[u], pointer[u + 1]):
             m = translate(tables, g, h, memory[label])
             if m >= 0 and m & at_memory == m:
-                e = abs(cost[label] + costs[u, v] - prices[h] - at_cost)
-                if e < off:
-                    off, from_vertex, from_label = e, u, label
+                error = abs(cost[label] + costs[u, v] - prices[h] - at_cost)
+                if error < min_error:
+                    min_error, from_vertex, from_label = error, u, label
     return from_vertex, from_label
 
 
@@ -461,9 +461,9 @@ def _step_back_in_numpy(
     vertex = np.repeat(np.arange(len(pointer) - 1), np.diff(pointer))
     masks = _translated(tables, goal[vertex], h, memory)
     fits = (goal[vertex] != h) & (masks >= 0) & ((masks & at_memory) == masks)
-    off = np.abs(cost + costs[vertex, v] - prices[h] - at_cost)
-    off = np.where(fits & (off < np.inf), off, np.inf)
-    if not (off < np.inf).any():
+    error = np.abs(cost + costs[vertex, v] - prices[h] - at_cost)
+    error = np.where(fits & (error < np.inf), error, np.inf)
+    if not (error < np.inf).any():
         return -1, -1
-    label = int(off.argmin())
+    label = int(error.argmin())
     return int(vertex[label]), label

@@ -1,10 +1,10 @@
-"""Sets of the ng-route relaxation (Baldacci, Mingozzi & Roberti 2011): what each goal remembers.
+"""Sets of the ng-route relaxation (Baldacci, Mingozzi & Roberti 2011): memories of goals.
 
-A walk that has reached goal g remembers, of the goals it visited, those that g remembers and that
-it never forgot since: M(h) = (M(g) ∩ N(h)) ∪ {h}. It must not visit a goal it remembers. If all N
-are full, the walks are tours; with little memory there are few states and the bound is weaker.
-Where the best walk repeats a goal, the goals between learn to remember it (Roberti & Mingozzi 2014,
-Martinelli, Pecin & Poggi 2014).
+Each goal h has a set N(h) of goals that it remembers. A walk that goes from goal g to goal h keeps,
+of the goals in its memory, only the goals in N(h), and adds h: M(h) = (M(g) ∩ N(h)) ∪ {h}. It must
+not visit a goal in its memory. If every N holds all goals, the walks are tours; with small sets
+there are few states and the bound is weaker. Where the best walk repeats a goal, the goals between
+learn to remember it (Roberti & Mingozzi 2014, Martinelli, Pecin & Poggi 2014).
 """
 
 from __future__ import annotations

@@ -8,8 +8,7 @@ because a tour visits every goal once and pays every price once. If the cheapest
 vertex v at its k-th visit is no cheaper than an incumbent, no better tour has v there: the state
 (k, v) is eliminated for good, whatever the prices later are.
 
-Sums are of floating-point numbers: `SUM_ROUNDING` times the size of the summands is taken off a
-bound.
+Sums are rounded: `SUM_ROUNDING` times the size of their terms is subtracted from a bound.
 """
 
 from __future__ import annotations
@@ -98,6 +97,7 @@ class Walks:
             self.alive &= (k > sooner) & (k <= self.n - later)
 
     def _group(self, cluster: Ints) -> None:
+        """Order the vertices by goal, and find where each goal's vertices begin."""
         self.cluster = cluster
         self.order: Ints = np.argsort(cluster, kind="stable")
         self.goal: Ints = cluster[self.order]
@@ -148,7 +148,7 @@ class Walks:
         prices
             (n + 1,) price of a visit to each goal.
         cutoff
-            Length of tours that are of no interest.
+            Length from which on tours are of no interest.
         check
             Called after every layer; may raise.
 
@@ -161,18 +161,18 @@ class Walks:
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
         layers = self._layers(prices, cut, check)
         pointer, cost, _ = layers[n]
-        has = pointer[1:] > pointer[:-1]
+        has_labels = pointer[1:] > pointer[:-1]
         ends = np.full(len(goal), np.inf)
-        ends[has] = cost[pointer[:-1][has]] + self.values[0][has]
+        ends[has_labels] = cost[pointer[:-1][has_labels]] + self.values[0][has_labels]
         last = int(np.argmin(ends))
         if not (np.isfinite(ends[last]) and ends[last] <= cut):
             self.alive[:] = False
             return None
         rows = self._trace(last, layers, prices)
         if self.ordered:
-            back = self._layers(prices, cut, check, backwards=True)
+            backward_layers = self._layers(prices, cut, check, backwards=True)
             for k in range(1, n + 1):
-                self.alive[k] &= join(goal, prices, layers[k], back[n + 1 - k]) <= cut
+                self.alive[k] &= join(goal, prices, layers[k], backward_layers[n + 1 - k]) <= cut
         else:
             for k in range(1, (n + 1) // 2 + 1):
                 through = join(goal, prices, layers[k], layers[n + 1 - k])
@@ -193,16 +193,20 @@ class Walks:
         n, goal = self.n, self.goal
         # a walk's k-th visit is the (n + 1 - k)-th from its end
         mirrored = np.concatenate([self.alive[:1], self.alive[:0:-1]])
-        own, rest = (mirrored, self.alive) if backwards else (self.alive, mirrored)
+        walk_alive, completion_alive = (
+            (mirrored, self.alive) if backwards else (self.alive, mirrored)
+        )
         lowest = np.empty((n + 1, len(goal)))
         onward = np.empty((n + 1, n + 1, len(goal)))
-        completions(self._graph, prices, np.ascontiguousarray(rest), lowest, onward, self.stop)
+        completions(
+            self._graph, prices, np.ascontiguousarray(completion_alive), lowest, onward, self.stop
+        )
         check()
         bits, tables = self.memory.bits, self.memory.tables(backwards=backwards)
         none = np.zeros(0, dtype=np.int32)
         layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
         with np.errstate(invalid="ignore"):  # inf - inf: no cut and no completion
-            limits = np.where(own[1:], cut - lowest[:0:-1], -np.inf)
+            limits = np.where(walk_alive[1:], cut - lowest[:0:-1], -np.inf)
         first = self.values[0]
         kept = np.isfinite(first) & (first <= limits[0])
         layers.append(
@@ -224,7 +228,7 @@ class Walks:
                         *extend(self._graph, *p, bits, tables, labels, bounds, prices, self.stop)
                     )
 
-                layers.append(_together(list(pool.map(part, parts))))
+                layers.append(_joined(list(pool.map(part, parts))))
         check()
         return layers
 
@@ -239,6 +243,7 @@ class Walks:
         return [(a, b) for a, b in pairwise(ends) if a < b]
 
     def _trace(self, last: int, layers: list[Labels], prices: Floats) -> Ints:
+        """Return the vertices (n,) of the cheapest walk, which ends at vertex `last`."""
         out = np.zeros(self.n, dtype=np.int64)
         out[-1] = last
         tables = self.memory.tables()
@@ -255,11 +260,11 @@ class Walks:
         lowest = np.zeros((len(self.goal), self.n + 1))
         for rows in self._blocks():
             lowest[rows] = np.minimum.reduceat(self.values[rows], self.start[:-1], axis=1)
-        between = np.minimum.reduceat(lowest, self.start[:-1], axis=0)
-        return np.argsort(between, axis=1, kind="stable")
+        goal_costs = np.minimum.reduceat(lowest, self.start[:-1], axis=0)
+        return np.argsort(goal_costs, axis=1, kind="stable")
 
 
-def _together(parts: list[Labels]) -> Labels:
+def _joined(parts: list[Labels]) -> Labels:
     """Join the labels of consecutive ranges of vertices; vertex 0 has none."""
     offset = 0
     pointers = [np.zeros(1, dtype=np.int64)]

@@ -71,16 +71,17 @@ def solve(graph: Instance, params: Params | None = None, limits: Limits | None =
 
 
 def _nearest_neighbour_tour(run: SolverRun, *, retrace: bool) -> str:
+    """Build the greedy tour, and return the stage that the run reports at its end."""
     graph = run.graph
     tour = [0]
     left = graph.cluster != 0
     is_small = len(graph) <= run.cost_policy.max_measured_vertices
     exact = is_small or not graph.estimate(len(graph)).seconds
-    every = np.arange(len(graph))
+    all_vertices = np.arange(len(graph))
     while left.any():
         run.check()
         at = tour[-1]
-        bounds = graph.costs[at] if exact else graph.lower_bounds(every, [at])[0]
+        bounds = graph.costs[at] if exact else graph.lower_bounds(all_vertices, [at])[0]
         nearest = _nearest(run, at, np.flatnonzero(left), bounds, exact=exact)
         if nearest is None:
             return "dead end"

@@ -93,7 +93,7 @@ class GtsplibInstance(ComparesArrays):
 
 
 def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> GtsplibInstance:
-    """Read a file of TSPLIB's format with the sets of GTSPLIB's.
+    """Read a file in TSPLIB's format, with the sets of GTSPLIB.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def load(path: str | Path, policy: FilePolicy = FilePolicy()) -> GtsplibInstance
     Raises
     ------
     InputError
-        Anything wrong with the file, by line; overlapping sets, asymmetric costs.
+        The file is malformed, its sets overlap or its costs are asymmetric; names the line.
     MemoryLimitError
         There is no room for the costs.
 
@@ -156,6 +156,7 @@ class _Reader:
                 raise self.wrong(number, f"unknown keyword {shown(name)}; expected one of {known}")
 
     def wrong(self, line: int | None, text: str) -> InputError:
+        """Return an error in a line of the file, or in the file as a whole."""
         return InputError(f"{self.path}: {'' if line is None else f'line {line}: '}{text}")
 
     def read(self) -> GtsplibInstance:
@@ -306,6 +307,7 @@ class _Reader:
         return out
 
     def put(self, out: Ints, cluster: int, members: Sequence[tuple[int, str]]) -> None:
+        """Write a set's number at its members, and check that no vertex is in two sets."""
         for line, token in members:
             v = self.vertex(line, token, len(out))
             if out[v] == cluster:

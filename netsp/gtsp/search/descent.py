@@ -18,10 +18,10 @@ def descend(
 ) -> float:
     """Move each cluster to where it costs least until no move shortens the tour.
 
-    ``links`` are those of the order, before and after. The tables of the links carry the rounding
-    of the largest numbers that went through them, so a gain within that rounding counts only if the
-    tour is shorter when measured afresh. That length depends on the order alone and falls from pass
-    to pass, so the descent ends whatever the costs are.
+    ``links`` belong to `order`, both on entry and on return. The tables of the links carry the
+    rounding of the largest numbers that went through them, so a gain within that rounding counts
+    only if the tour is shorter when measured afresh. The length measured afresh depends on the
+    order alone and falls from pass to pass, so the descent ends whatever the costs are.
 
     Returns
     -------
@@ -40,9 +40,9 @@ def descend(
         for c in range(1, n):
             if stop[0] != 0:
                 break
-            was = prior[c]
+            old_place = prior[c]
             d = take_out(c, after, prior, start, costs, ahead, behind, grown, rest, row)
-            p, more = best_place(
+            p, increase = best_place(
                 c,
                 after,
                 prior,
@@ -60,16 +60,16 @@ def descend(
                 0.0,
                 chance,
             )
-            gain = -(d + more)
-            if p != was and gain > min_gain * length:
+            gain = -(d + increase)
+            if p != old_place and gain > min_gain * length:
                 if gain > rounding or _is_shorter(
-                    c, p, was, min_gain, after, prior, start, costs, work
+                    c, p, old_place, min_gain, after, prior, start, costs, work
                 ):
                     improved = True
                 else:
-                    p = was
+                    p = old_place
             else:
-                p = was
+                p = old_place
             put(c, p, after, prior, start, costs, ahead, behind, grown, rest, row)
         if improved:
             write_order(after, work)
@@ -87,7 +87,7 @@ def descend(
 def _is_shorter(
     c: int,
     p: int,
-    was: int,
+    old_place: int,
     min_gain: float,
     after: Ints,
     prior: Ints,
@@ -95,11 +95,11 @@ def _is_shorter(
     costs: Floats,
     work: Ints,
 ) -> bool:
-    """Return whether the tour, measured afresh, is shorter with cluster c after p than after `was`.
+    """Return whether the tour, measured afresh, is shorter with cluster c moved after p.
 
-    Cluster c is out of the tour; `work` is room for an order.
+    Cluster c is out of the tour, and was after `old_place`; `work` is a work array for an order.
     """
-    _write_order_with(c, was, after, work)
+    _write_order_with(c, old_place, after, work)
     length, _ = best_classes(work[1:], start, costs)
     _write_order_with(c, p, after, work)
     measured, _ = best_classes(work[1:], start, costs)

@@ -146,8 +146,8 @@ class LayeredInstance:
 
     @cached_property
     def beside(self) -> tuple[Ints, Ints]:
-        """Clusters that each may be inserted next to, nearest first: where those of each begin
-        (m + 2,), and all of them."""
+        """Clusters that each cluster may be inserted next to, nearest first: start of the stretch
+        of each cluster (m + 2,), and all stretches joined."""
         c, p = np.nonzero(self.near)
         order = np.lexsort((self.cluster_costs[c, p], c))
         return np.searchsorted(c, np.arange(len(self.near) + 1)), p[order]
@@ -174,7 +174,7 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
     for k in range(n):
         largest = max(largest, start[clusters[k] + 1] - start[clusters[k]])
     reach = np.full((n, largest), np.inf)
-    back = np.zeros((n, largest), dtype=np.int64)
+    predecessor = np.zeros((n, largest), dtype=np.int64)
     for k in range(n):
         c = clusters[k]
         for j in range(start[c + 1] - start[c]):
@@ -186,7 +186,7 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
             for i in range(start[p + 1] - start[p]):
                 d = reach[k - 1, i] + costs[start[p] + i, v]
                 if d < reach[k, j]:
-                    reach[k, j], back[k, j] = d, i
+                    reach[k, j], predecessor[k, j] = d, i
     best, at = np.inf, 0
     c = clusters[n - 1]
     for j in range(start[c + 1] - start[c]):
@@ -196,7 +196,7 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
     tour = np.zeros(n + 1, dtype=np.int64)
     for k in range(n - 1, -1, -1):
         tour[k + 1] = start[clusters[k]] + at
-        at = back[k, at]
+        at = predecessor[k, at]
     return best, tour
 
 
@@ -204,18 +204,18 @@ def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Int
 def _best_classes_in_numpy(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Ints]:
     """Vectorise `best_classes` over the vertices of a cluster."""
     n = len(clusters)
-    own = [slice(start[c], start[c + 1]) for c in clusters]
-    reach, back = costs[0, own[0]], []
-    for before, now in pairwise(own):
-        lengths = reach[:, None] + costs[before, now]
-        back.append(lengths.argmin(axis=0))
+    members = [slice(start[c], start[c + 1]) for c in clusters]
+    reach, predecessors = costs[0, members[0]], []
+    for previous, current in pairwise(members):
+        lengths = reach[:, None] + costs[previous, current]
+        predecessors.append(lengths.argmin(axis=0))
         reach = lengths.min(axis=0)
-    home = reach + costs[own[-1], 0]
-    at = int(home.argmin())
-    best, tour = float(home[at]), np.zeros(n + 1, dtype=np.int64)
+    closed = reach + costs[members[-1], 0]
+    at = int(closed.argmin())
+    best, tour = float(closed[at]), np.zeros(n + 1, dtype=np.int64)
     for k in range(n - 1, -1, -1):
-        tour[k + 1] = own[k].start + at
-        at = int(back[k - 1][at]) if k else 0
+        tour[k + 1] = members[k].start + at
+        at = int(predecessors[k - 1][at]) if k else 0
     return best, tour
 
 

@@ -90,8 +90,8 @@ def carry_on(
 
     It ends at a cluster, after the next `sure` ones, whose numbers do not change. With ``after``
     and ``prior`` exchanged it fills ``behind`` and ``rest``, towards the base. Numbers that are
-    equal within rounding are not rewritten: if they were, without those after them, the tables
-    would drift apart.
+    equal within rounding are not rewritten: if they were, and the numbers after them were not, the
+    tables would drift apart.
     """
     longer = 0.0
     while True:
@@ -111,11 +111,11 @@ def carry_on(
         grown[c] = lowest
         if c == 0:
             return float(longer)
-        even = sure <= 0
+        is_unchanged = sure <= 0
         for j in range(size):
             if abs(row[j] - lowest - ahead[c, j]) > EQUAL_LENGTHS * row[j]:
-                even = False
-        if even:
+                is_unchanged = False
+        if is_unchanged:
             return float(longer)
         for j in range(size):
             ahead[c, j] = row[j] - lowest
@@ -223,11 +223,11 @@ def take_out(
     row: Floats,
 ) -> float:
     """Remove cluster c and return the change of the tour's length, which is negative."""
-    p, q, own = prior[c], after[c], grown[c]
+    p, q, old_growth = prior[c], after[c], grown[c]
     after[p], prior[q], after[c], prior[c] = q, p, -1, -1
     grown[c] = 0.0
     carry_on(p, 0, prior, after, start, costs, behind, rest, row)
-    return float(carry_on(q, 0, after, prior, start, costs, ahead, grown, row) - own)
+    return float(carry_on(q, 0, after, prior, start, costs, ahead, grown, row) - old_growth)
 
 
 @kernel
@@ -243,13 +243,13 @@ def between(
     behind: Floats,
     rest: Floats,
 ) -> float:
-    """Return by how much cluster c after p lengthens the best tour; `limit` if by at least that."""
+    """Return by how much inserting cluster c after p lengthens the best tour, at most `limit`."""
     q = after[p]
     now = np.inf
     for i in range(start[p + 1] - start[p]):
         now = min(now, ahead[p, i] + behind[p, i])
     now += rest[p]
-    # no leg is shorter than the least between its clusters, and both tables are 0 or more
+    # no leg is cheaper than the cheapest between its clusters, and both tables are 0 or more
     if nearest[p, c] + nearest[c, q] - now >= limit:
         return limit
     bar = limit + now
@@ -318,12 +318,13 @@ def best_place(
     blink: float,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[int, float]:
-    """Return the cluster after which cluster c costs least, and what it costs there.
+    """Return the cluster after which inserting cluster c costs least, and its cost.
 
-    Places are next to one of its near clusters, and at either end of the stretch between those that
-    must come before and after it, without precedences next to the base. With precedences closed
-    transitively there is such a stretch, whatever remains to be inserted. Other places than its
-    ends are skipped with probability `blink`. `place` is room for the places of clusters.
+    The places tried are next to one of its near clusters, and at both ends of the stretch between
+    the clusters that must precede and follow it; without precedences the stretch begins and ends at
+    the base. Because precedences are closed transitively, there is such a stretch, whatever remains
+    to be inserted. Places other than its ends are skipped with probability `blink`. `place` is a
+    work array for the places of clusters.
     """
     low, high = 0, prior[0]
     if len(before) > 0:

@@ -80,10 +80,10 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     )
     core = search_core(run, count)
     instance = LayeredInstance.among(graph, core, policy.local_search)
-    by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
-    if not by_clock and run.iteration_limit == np.inf:
+    is_timed = run.clock.limit is not None and run.iteration_limit == np.inf
+    if not is_timed and run.iteration_limit == np.inf:
         run.iteration_limit = chosen.rounds_per_goal * graph.goal_count
-    total = 0 if by_clock else int(run.iteration_limit)
+    total = 0 if is_timed else int(run.iteration_limit)
     for k in range(chosen.restarts):
         start = None if run.tour is None else graph.cluster[list(run.tour)]
         run.check()
@@ -106,7 +106,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
             run.report("search", current=search.length)
 
         rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
-        search.run(np.inf if by_clock else rounds, clock, progress if by_clock else None, on_chunk)
+        search.run(np.inf if is_timed else rounds, clock, progress if is_timed else None, on_chunk)
 
 
 def search_core(run: SolverRun, classes: int) -> Ints:
@@ -128,7 +128,7 @@ def _offer_incumbent(run: SolverRun, search: Search) -> None:
 
 
 def max_classes_per_goal(graph: Instance, vertices: int) -> int:
-    """Return the number of classes per goal, at least 3, that make at most some vertices in all."""
+    """Return the number of classes per goal, at least 3, that keeps the total within `vertices`."""
     sizes = np.bincount(graph.cluster)
     k = 3
     while k < sizes.max() and np.minimum(sizes, k + 1).sum() <= vertices:

@@ -161,14 +161,14 @@ class Search:
         n = len(self.order)
         self._link()
         done, chunk = 0, 1
-        leg = self.length / n
+        mean_leg = self.length / n
         # a temperature lasts a number of rounds, whatever time they take, so that runs repeat
         step = 1 if progress else max(1, int(rounds) // policy.temperature_steps)
         hot, cold = policy.first_temperature, policy.last_temperature
         strings = StringPolicy(policy.max_string_length, policy.mean_removed, policy.blink_rate)
         while done < rounds and n > 3 and not clock.is_up:
             share = progress() if progress else (done - done % step) / rounds
-            theta = leg * hot * (cold / hot) ** min(share, 1.0)
+            theta = mean_leg * hot * (cold / hot) ** min(share, 1.0)
             count = int(min(chunk, rounds - done if progress else step - done % step))
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
@@ -222,10 +222,10 @@ def _farthest_insertion(d: npt.NDArray[np.float64], before: Bools) -> Ints:
         t = np.array(tour)
         after = np.roll(t, -1)
         between = d[t, after] if len(t) > 1 else np.zeros(1)
-        more = d[t, k] + d[k, after] - between
+        increase = d[t, k] + d[k, after] - between
         if len(before):
-            more[: int(np.flatnonzero(before[t, k]).max(initial=0))] = np.inf
-            more[int(np.flatnonzero(before[k, t]).min(initial=len(t))) :] = np.inf
-        tour.insert(int(np.argmin(more)) + 1, k)
+            increase[: int(np.flatnonzero(before[t, k]).max(initial=0))] = np.inf
+            increase[int(np.flatnonzero(before[k, t]).min(initial=len(t))) :] = np.inf
+        tour.insert(int(np.argmin(increase)) + 1, k)
         left.remove(k)
     return np.array(tour, dtype=np.int64)

@@ -53,9 +53,9 @@ def ruin_and_recreate(
 ) -> tuple[float, float]:
     """Make `count` rounds at temperature `theta`, in place.
 
-    ``links`` are those of the present order, before and after. They are never filled afresh in
-    between, so that the result does not depend on how rounds are grouped into calls. A round that
-    is not accepted is undone by a copy of them.
+    ``links`` belong to the present order, both on entry and on return. They are never filled afresh
+    between rounds, so that the result does not depend on how rounds are grouped into calls. A round
+    that is not accepted is undone by a copy of the links.
 
     Returns
     -------
@@ -85,11 +85,11 @@ def ruin_and_recreate(
                 continue
             strings -= 1
             size = 1 + below(longest, chance)
-            back = below(size, chance)
-            while back > 0 and prior[c] != 0:
+            steps_back = below(size, chance)
+            while steps_back > 0 and prior[c] != 0:
                 c = prior[c]
-                back -= 1
-            for _ in range(size - back):
+                steps_back -= 1
+            for _ in range(size - steps_back):
                 if c == 0:
                     break
                 if not out[c]:
@@ -163,7 +163,7 @@ def ruin_and_recreate(
 
 @kernel
 def _write(to: Links, links: Links) -> None:
-    """Copy links to others."""
+    """Copy `links` into `to`."""
     write_ints(to.after, links.after, len(links.after))
     write_ints(to.prior, links.prior, len(links.prior))
     write_rows(to.ahead, links.ahead, len(links.ahead))

@@ -78,7 +78,7 @@ def of_part(
     Parameters
     ----------
     listener : callable, optional
-        Of the run over all of it.
+        Listener of the run over the whole graph.
     chosen : ndarray of int
         The part's vertices in the whole graph.
     bound_of_whole : callable
@@ -92,11 +92,11 @@ def of_part(
     if listener is None:
         return None
 
-    def tell(row: Progress) -> None:
+    def pass_on(row: Progress) -> None:
         tour = None if row.tour is None else tuple(int(chosen[v]) for v in row.tour)
         listener(replace(row, tour=tour, bound=bound_of_whole(row.bound)))
 
-    return tell
+    return pass_on
 
 
 @dataclass(frozen=True, eq=False)
