@@ -68,8 +68,8 @@ class Choice(NamedTuple):
 class Tree:
     """Tree search that dives: of two new nodes, the more restricted one is processed next.
 
-    When nothing is left below it, the node of least bound follows. If the incumbent is the shortest
-    tour, which is usual, the order makes no difference to the number of nodes.
+    When nothing is left below a node, the node of lowest bound follows. If the incumbent is the
+    shortest tour, which is usual, the order makes no difference to the number of nodes.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Tree:
             if choice is None:
                 settled = min(settled, bound)
             else:
-                # dive: the LP of a child re-solves in few simplex steps, another in thousands
+                # dive: a child's LP re-solves in a few simplex steps, any other node's in thousands
                 other, node = (
                     Node(bound, next(self._rank), alive, adjacent)
                     for alive, adjacent in (choice.without, choice.within)
@@ -144,7 +144,7 @@ class Tree:
             run.raise_bound(min(settled, run.cutoff))
 
     def _process(self, node: Node) -> tuple[float, Choice | None]:
-        """Return the bound of a node and how to branch; None if no better tour is left in it."""
+        """Return a node's bound and its two branches; None if no better tour is left in it."""
         run, lp, alive, policy = self.run, self.lp, node.alive, self.policy
         costs = self._costs(node.adjacent)
         lp.set_costs(costs)
@@ -216,8 +216,8 @@ class Tree:
             for legs, pairs in (choice.without, choice.within):
                 value = self.lp.probe(self._costs(pairs), legs, self.policy.probe_steps)
                 value += self.charge * len(pairs)
-                now = point.objective + self.charge * len(adjacent)
-                gains.append(max(min(value, self.run.cutoff) - now, 1e-6 * abs(now)))
+                current = point.objective + self.charge * len(adjacent)
+                gains.append(max(min(value, self.run.cutoff) - current, 1e-6 * abs(current)))
             if gains[0] * gains[1] > best_gain:
                 best, best_gain = choice, gains[0] * gains[1]
         self.lp.set_costs(costs)
@@ -233,7 +233,7 @@ class Tree:
         min_distance = self.policy.min_fractionality
         between = np.triu(cluster_flows(point.legs, point.y, self.cluster), 1)
         for g, h in adjacent:
-            between[g, h] = 0.0  # a pair is charged once
+            between[g, h] = 0.0  # a pair gets its discount once
         for g, h in _most_fractional(between, self.policy.pair_candidates, min_distance):
             legs = self.pair == g * self.clusters + h
             inside = np.isin(self.cluster, (g, h))

@@ -69,9 +69,9 @@ def comb_cuts(
             continue
         seen.add(label.tobytes())
         count = int(label.max()) + 1
-        to = np.zeros((count, len(cluster_flow)))
-        to[label, np.arange(len(cluster_flow))] = 1.0
-        flow = to @ cluster_flow @ to.T
+        shrink = np.zeros((count, len(cluster_flow)))
+        shrink[label, np.arange(len(cluster_flow))] = 1.0
+        flow = shrink @ cluster_flow @ shrink.T
         np.fill_diagonal(flow, 0.0)
         for handle in fractional_components(flow, 2, policy):
             violation, pairs = _teeth(flow, handle, policy.min_tooth_flow)
@@ -106,7 +106,7 @@ def _teeth(
     across = flow[np.ix_(inside, outside)]
     around = flow.sum(axis=1)
     pairs: list[tuple[int, int]] = []
-    short: list[float] = []
+    gains: list[float] = []
     used: set[int] = set()
     rows, cols = np.nonzero(across > min_tooth_flow)
     for k in np.argsort(-across[rows, cols], kind="stable"):
@@ -115,11 +115,11 @@ def _teeth(
             continue
         used |= {a, b}
         pairs.append((a, b))
-        # what the tooth's own crossing leaves of 3
-        short.append(3.0 - float(around[a] + around[b] - 2.0 * flow[a, b]))
+        # a tooth adds 3 less the flow across it to the violation
+        gains.append(3.0 - float(around[a] + around[b] - 2.0 * flow[a, b]))
     best, count = -np.inf, 0
     for k in range(3, len(pairs) + 1, 2):
-        violation = sum(short[:k]) + 1.0 - float(across.sum())
+        violation = sum(gains[:k]) + 1.0 - float(across.sum())
         if violation > best:
             best, count = violation, k
     return best, pairs[:count]

@@ -3,7 +3,7 @@
 A leg between two classes lies above the leg between their cells, which costs no more. If it costs
 more than the leg of the cells by more than the slack of that leg in the cover's bound, it is in no
 better tour. After a few covers over paths between goals fewer than one leg in ten is left. So legs
-are measured in blocks, of which most is discarded at once, and no matrix of all legs is made.
+are measured in blocks, most of which is discarded at once, and no matrix of all legs is made.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ class Cells:
     Attributes
     ----------
     barriers
-        Barriers that count.
+        Barriers by whose sides the cells differ.
     cluster
         (m,) goal of each cell.
     code

@@ -33,8 +33,8 @@ class Covers(Protocol):
     def costs_by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """Return the costs (k, n, 2) of the cheapest legs between two cells (k, 2), by parity.
 
-        They are those of the legs that cross an even, and an odd, number of times each
-        barrier. A cost is inf, or any lower bound on it, if there is no such leg.
+        Entry [k, i, p] covers the legs that cross barrier i an even (p = 0) or an odd (p = 1)
+        number of times. It is inf, or any lower bound on such a cost, if there is no such leg.
         """
 
 
@@ -44,7 +44,7 @@ class ClassCovers:
     Parameters
     ----------
     costs
-        (V, V) costs of legs; or the costs of the legs left, and then only classes with legs count.
+        (V, V) costs of legs; or sparse costs, where classes without legs are ignored.
     cluster
         (V,) cluster of each vertex.
     odd
@@ -93,7 +93,7 @@ class ClassCovers:
 
 @kernel
 def _fill_lowest(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
-    """Fill in the least costs between the members of two cells."""
+    """Fill in the lowest costs between the members of two cells."""
     cells = len(row) - 1
     cell = np.empty(len(order), dtype=np.int64)
     for b in range(cells):
@@ -108,7 +108,7 @@ def _fill_lowest(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
 
 @kernel
 def _lowest_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: Ints) -> Floats:
-    """Return the least costs (k, n, 2) between the members of two cells, by parity."""
+    """Return the lowest costs (k, n, 2) between the members of two cells, by parity."""
     n = odd.shape[1]
     out = np.full((len(ends), n, 2), np.inf)
     for k in range(len(ends)):
@@ -123,7 +123,7 @@ def _lowest_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: I
 
 @kernel
 def _fill_lowest_in_rows(rows: Rows, cell: Ints, out: Floats) -> None:
-    """Fill in the least costs of the legs left between two cells."""
+    """Fill in the lowest costs of the legs left between two cells."""
     for u in range(len(cell)):
         for k in range(rows.first[u], rows.first[u] + rows.size[u]):
             a, b = cell[u], cell[rows.other[k]]
@@ -135,7 +135,7 @@ def _fill_lowest_in_rows(rows: Rows, cell: Ints, out: Floats) -> None:
 def _lowest_by_parity_in_rows(
     rows: Rows, odd: Bools, cell: Ints, order: Ints, row: Ints, ends: Ints
 ) -> Floats:
-    """Return the least costs (k, n, 2) of the legs left between two cells, by parity."""
+    """Return the lowest costs (k, n, 2) of the legs left between two cells, by parity."""
     n = odd.shape[1]
     out = np.full((len(ends), n, 2), np.inf)
     for e in range(len(ends)):
@@ -152,7 +152,7 @@ def _lowest_by_parity_in_rows(
 
 
 class PathCovers:
-    """Covers with the lengths of shortest paths between goals, whatever classes there are.
+    """Covers with the lengths of shortest paths between goals, whatever classes a roadmap keeps.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ class CoverRefinement:
             return []
         lengths = self.covers.costs_by_parity(cells, ends)
         lowest = lengths.min(axis=2, keepdims=True)
-        lowest[np.isinf(lowest)] = 0.0  # no leg lies above such a leg
+        lowest[np.isinf(lowest)] = 0.0  # no leg lies above these, so they have no excess
         excess = y[:, None, None] * np.minimum(lengths - lowest, gap)
         excess = np.ascontiguousarray(excess.swapaxes(0, 1))
         new_cells = {}
@@ -116,7 +116,7 @@ def _sides(cells: Cells, split: Cells) -> Bools:
 
 @kernel
 def frustration(ends: Ints, excess: Floats, sides: Bools, max_passes: int) -> float:
-    """Return what legs cost more if each cell is on one side, near the minimum.
+    """Return the excess cost of legs with each cell on one side, near its minimum.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def frustration(ends: Ints, excess: Floats, sides: Bools, max_passes: int) -> fl
 def _sides_along_tree(ends: Ints, excess: Floats, sides: Bools) -> Ints:
     """Return the side of each cell by a spanning tree of the legs whose sides differ most."""
     m = len(sides)
-    # forests with sides relative to the root; cells with one side hang on a root of their own
+    # forests with sides relative to the root; cells with only one side join the extra root m
     parent, turned = np.arange(m + 1), np.zeros(m + 1, dtype=np.int64)
     for v in range(m):
         if sides[v, 0] != sides[v, 1]:

@@ -1,11 +1,11 @@
-"""Lower bounds from covers of more and more sheets.
+"""Lower bounds from a series of covers, each with more sheets than the last.
 
 A barrier is a number in the labels of vertices (`netsp.mip.parity_cuts`). Over goals alone a tour
-may cross barriers an odd number of times. Over all classes there are so many that the
-relaxation falls to the bound over goals before it rises. Between the two are covers of finitely
-many sheets: a *cell* is a goal and, for each of some barriers, whether labels hold an odd number
-of it. With no barrier the cells are the goals; with all of them they are still
-far fewer than the classes. A leg between two cells costs no more than any leg between their classes
+may cross barriers an odd number of times. Over all classes, of which there are very many, the
+relaxation first falls to the bound over goals before it rises. Between the two are covers of
+finitely many sheets: a *cell* is a goal and, for each of some barriers, the parity with which
+labels hold it. With no barrier the cells are the goals; with all barriers there are still far fewer
+cells than classes. A leg between two cells costs no more than any leg between their classes
 (`netsp.mip.cover_costs`), so every tour over classes is one over cells, no longer, and bounds over
 cells hold for it.
 
@@ -142,10 +142,11 @@ class _Series:
                 # over the same barriers first, because cells have changed
                 self.covers = refinement.covers = self.refine_costs(self.found, length)
                 continue
-            more = refinement.next_barriers(level.cells, *level.used_legs(), gap, level.run.check)
-            if not more:
+            used_legs = level.used_legs()
+            added = refinement.next_barriers(level.cells, *used_legs, gap, level.run.check)
+            if not added:
                 return
-            barriers += more
+            barriers += added
 
 
 class _Level:
@@ -179,7 +180,7 @@ class _Level:
         )
         cluster = self.cells.cluster
         graph = Instance(cluster, MatrixCosts(costs, cluster), _labels(self.cells))
-        # tours over cells are none over classes: the incumbent is one over classes
+        # a tour over cells may be no tour over classes, so only the latter become incumbents
         run = self.run = SearchingRun(graph, limits, policy=policy.gtsp)
         run.tour, run.length = tuple(self.cell_tour.tolist()), length
         if below is not None:
@@ -267,6 +268,7 @@ class _Level:
 
 
 def _spread(flags: Bools, at: Ints, size: int) -> Bools:
+    """Return a mask of a given size with flags at some places."""
     out = np.zeros(size, dtype=bool)
     out[at] = flags
     return out

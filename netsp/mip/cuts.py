@@ -65,8 +65,8 @@ class Cut:
     def splits_clusters(self, cluster: Ints) -> bool:
         """Return whether only some of the legs between the clusters of a tooth count in it.
 
-        So it is if all teeth are pairs, and S is no union of clusters, or holds both or neither of
-        a pair because vertices were removed.
+        This is the case if all teeth are pairs, and S is no union of clusters, or holds both or
+        neither cluster of a pair because vertices were removed.
         """
         if not self.teeth or any(len(t) > 2 for t in self.teeth):
             return False
@@ -93,9 +93,9 @@ class Cut:
         The coefficient is 2 for a leg within both the handle and a tooth.
         """
         both = self.inside[legs[:, 0]] & self.inside[legs[:, 1]]
-        times = both.astype(np.float64) + self.in_tooth(cluster, legs)
-        rows = np.flatnonzero(times)
-        return rows, times[rows]
+        coefficients = both.astype(np.float64) + self.in_tooth(cluster, legs)
+        rows = np.flatnonzero(coefficients)
+        return rows, coefficients[rows]
 
 
 def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:

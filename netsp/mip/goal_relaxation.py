@@ -6,8 +6,8 @@ roadmap knows the paths between goals by the rays that they cross, covers of fin
 leave 2 % (`netsp.mip.covers`).
 
 With hundreds of goals the proof of that tour may have no bound for long. So 1-trees come first
-(Held and Karp 1970, 1971): spanning trees of all goals but one, and two legs there, with prices
-that goals of too many legs pay and goals of too few get. Each 1-tree is a bound.
+(Held and Karp 1970, 1971): a spanning tree of all goals but one, and two legs at that one. Prices
+rise at goals with more than two legs and fall at goals with fewer. Each 1-tree gives a bound.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ OnBound = Callable[[float, int, Ints], Sequence[int] | None]
 tether in the cells that the program's point visits. Returns a better tour, or None."""
 
 Prove = Callable[[Instance, Limits], tuple[Result, Sequence[Cut]]]
-"""Solver that bounds, which returns its result and the cuts that it had in the end."""
+"""Solver that proves, which returns its result and the cuts in its last LP."""
 
 
 @dataclass(frozen=True)
@@ -105,12 +105,12 @@ def goal_bound_steps(
         run = _CoverRun(graph, tour, replace(limits, time=clock), costs, on_bound, policy)
         cells = yield from run.steps()
     if cells is None or graph.goal_count < policy.goals.max_proven_goals:
-        over = Instance.from_costs(distances, range(graph.goal_count + 1))
+        goal_graph = Instance.from_costs(distances, range(graph.goal_count + 1))
         programs = policy.goals.max_programs
         if limits.iterations is not None:
             programs = min(limits.iterations, programs)
-        result, found = prove(over, replace(limits, time=clock, iterations=programs))
-        bound, cuts = max(bound, result.lower_bound or 0.0), tuple(found)
+        result, last_cuts = prove(goal_graph, replace(limits, time=clock, iterations=programs))
+        bound, cuts = max(bound, result.lower_bound or 0.0), tuple(last_cuts)
     bound *= 1.0 - PATH_ROUNDING
     over_cells = cells.bound * (1.0 - PATH_ROUNDING) if cells else 0.0
     in_any_class = bound if costs.is_over_kept_classes else max(bound, over_cells)
@@ -121,8 +121,8 @@ def goal_bound_steps(
 def bound_by_one_trees(graph: Instance, policy: GoalBoundPolicy = GoalBoundPolicy()) -> None:
     """Give a graph a first bound when no time is left, without measuring legs.
 
-    It is that of a few 1-trees of straight lines between goals, or of the least costs between
-    clusters.
+    The bound comes from a few 1-trees over straight lines between goals, or over the lowest costs
+    between clusters.
     """
     if not graph.bound_in_any_class:
         distances = graph.distances_between_goals(lambda: True)
@@ -197,12 +197,14 @@ class _CoverRun:
         """Pass a bound on, and return the better tour that comes back."""
         graph, bound = self.graph, bound * (1.0 - PATH_ROUNDING)
         cell = cells.cells_of(graph.cluster, self.odd)
-        above = np.flatnonzero(np.isin(cell, visited))
+        above_visited = np.flatnonzero(np.isin(cell, visited))
         count = self.policy.covers.classes_per_cell
-        chosen = cheapest_per_cluster(graph.costs_to_base[above], cell[above], count)
+        chosen = cheapest_per_cluster(
+            graph.costs_to_base[above_visited], cell[above_visited], count
+        )
         if not self.costs.is_over_kept_classes:
             _raise_bound_in_any_class(graph, bound)
-        better = self.on_bound(bound, len(cells.cluster), above[chosen])
+        better = self.on_bound(bound, len(cells.cluster), above_visited[chosen])
         if better is None:
             return None
         self.tour = list(better)
@@ -234,15 +236,15 @@ def one_tree_bound(
     n = len(lengths)
     if n < 3:
         return 0.0
-    prices, best, step, vain = np.zeros(n), -np.inf, policy.first_step, 0
+    prices, best, step, vain_trees = np.zeros(n), -np.inf, policy.first_step, 0
     best_prices = prices
     for _ in range(policy.max_trees):
         bound, missing = _one_tree(lengths, prices)
         if bound > best:
-            best, best_prices, vain = bound, prices, 0
+            best, best_prices, vain_trees = bound, prices, 0
         else:
-            vain += 1
-            if vain % policy.patience == 0:
+            vain_trees += 1
+            if vain_trees % policy.patience == 0:
                 step, prices = step * policy.step_decay, best_prices
                 continue
         size = float(missing @ missing)
@@ -257,7 +259,7 @@ def _one_tree(lengths: Floats, prices: Floats) -> tuple[float, Floats]:
     from scipy.sparse.csgraph import minimum_spanning_tree
 
     priced = lengths + prices[:, None] + prices[None, :]
-    two = np.partition(priced[0, 1:], 1)[:2]
+    two_legs = np.partition(priced[0, 1:], 1)[:2]
     at = np.argpartition(priced[0, 1:], 1)[:2] + 1
     # scipy takes a stored zero for no edge; adding a constant keeps the spanning tree
     rest = priced[1:, 1:]
@@ -265,5 +267,5 @@ def _one_tree(lengths: Floats, prices: Floats) -> tuple[float, Floats]:
     tree = minimum_spanning_tree(rest + shift).tocoo()
     degree = np.bincount(np.concatenate([tree.row + 1, tree.col + 1, at]), minlength=len(lengths))
     degree[0] = 2
-    length = float(rest[tree.row, tree.col].sum() + two.sum())
+    length = float(rest[tree.row, tree.col].sum() + two_legs.sum())
     return length - 2.0 * float(prices.sum()), degree.astype(np.float64) - 2.0

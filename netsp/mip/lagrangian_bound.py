@@ -8,7 +8,7 @@ with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k or uv in 
 r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k]. A tour takes one vertex of each cluster, and there
 two legs (m >= 2), each of which has two ends; so
 
-    length >= Σ_k μ_k room_k + Σ_C (λ_C + min over v in C of (r_v + half of its two least r_uv)).
+    length >= Σ_k μ_k room_k + Σ_C (λ_C + min over v in C of (r_v + half of its two lowest r_uv)).
 
 It holds whatever the solver's tolerances were. At an LP optimum no r_uv is negative, and the bound
 is at least the optimum. Before, while many legs of negative r_uv are not in the LP yet, it is far
@@ -35,7 +35,8 @@ BOUND_ROUNDING = 1e-12
 def rounding(duals: Duals, longest: float) -> float:
     """Return the largest rounding error of a bound.
 
-    It is `BOUND_ROUNDING` times all duals and, for each leg of a tour, the largest reduced cost.
+    It is `BOUND_ROUNDING` times the sum of all absolute duals and, for each leg of a tour, of the
+    largest reduced cost.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def rounding(duals: Duals, longest: float) -> float:
 
 
 def lowest_of_clusters(values: Floats, cluster: Ints) -> Floats:
-    """Return the least value of the vertices of each cluster, shape (m + 1,)."""
+    """Return the lowest value of the vertices of each cluster, shape (m + 1,)."""
     lowest = np.full(int(cluster.max()) + 1, np.inf)
     np.minimum.at(lowest, cluster, values)
     return lowest

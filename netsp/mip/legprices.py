@@ -67,7 +67,7 @@ class LegPrices:
 
 
 def _two_lowest(legs: Ints, values: Floats, size: int) -> tuple[Floats, Floats]:
-    """Return the two least values (V,) of the legs at each vertex, inf where legs are missing."""
+    """Return the two lowest values (V,) of the legs at each vertex, inf where legs are missing."""
     ends, leg_values = legs.ravel(), np.repeat(values, 2)
     order = np.lexsort((leg_values, ends))
     ends, leg_values = ends[order], np.append(leg_values[order], [np.inf, np.inf])

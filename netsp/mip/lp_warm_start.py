@@ -1,4 +1,4 @@
-"""Warm start: a program over some of the vertices, from which that over all begins."""
+"""Warm start of the program over all vertices from a program over some of them."""
 
 from __future__ import annotations
 
@@ -35,24 +35,25 @@ class WarmStart:
     def lifted_cuts(self, costs: CostMatrix) -> list[Cut]:
         """Return the cuts over all vertices left, each in up to two versions.
 
-        A vertex that is not in the program joins the nearest vertex of the program in one version,
-        and in the other the vertex of its cluster that is nearest to the base; if the set must be a
-        union of clusters, it joins its cluster. A cut of (4) holds for any set without the base, so
-        a poor choice only makes it weaker. Either version alone leaves a far larger gap.
+        A vertex that is not in the program joins a vertex of the program: in one version the
+        nearest one, in the other the one of its cluster that is nearest to the base. If the set
+        must be a union of clusters, the vertex joins its cluster. A cut of (4) holds for any set
+        without the base, so a poor choice only makes the cut weaker. Either version alone leaves a
+        far larger gap.
         """
         place = np.searchsorted(costs.vertices, self.vertices)
         cluster, held = costs.cluster, costs.cluster[place]
         near, base_costs = costs.nearest_among(place), costs.base_costs
-        akin = np.empty_like(near)
+        of_cluster = np.empty_like(near)
         for c in range(int(cluster.max()) + 1):
             members = np.flatnonzero(held == c)
-            akin[cluster == c] = members[np.argmin(base_costs[place[members]])]
-        near[place] = akin[place] = np.arange(len(place))
+            of_cluster[cluster == c] = members[np.argmin(base_costs[place[members]])]
+        near[place] = of_cluster[place] = np.arange(len(place))
         out: dict[tuple[bytes, object], Cut] = {}
-        for partner in (near, akin):
+        for partner in (near, of_cluster):
             for cut in self.cuts:
                 is_whole = cut.teeth and cut.is_union_of_clusters(held)
-                inside = cut.inside[akin if is_whole else partner] | (cluster == cut.cluster)
+                inside = cut.inside[of_cluster if is_whole else partner] | (cluster == cut.cluster)
                 out.setdefault((inside.tobytes(), cut.teeth), replace(cut, inside=inside))
         return list(out.values())
 

@@ -55,8 +55,8 @@ class CutPolicy:
     max_idle_rounds
         Rounds without a price after which a cut leaves the LP; separation finds it again if needed.
     slack_rounds
-        Rounds that a round with slack counts as. A cut that is tight without a price may only lie
-        where the LP has no legs.
+        Number of idle rounds for which a round with slack counts. A cut that is tight without a
+        price may only lie where the LP has no legs.
     max_kept_share
         Idle cuts are removed only if at most this share of all cuts remains.
     """
@@ -155,8 +155,8 @@ class SchedulePolicy:
     patience
         Pricing passes without progress after which the root ends.
     estimated_patience
-        Same while legs are only estimated: measuring and a second root come next, so the root ends
-        early.
+        Value of `patience` while legs are only estimated: measuring and a second root come next, so
+        the root ends early.
     min_new_leg_share
         Share of the LP's legs that a pass must add not to be idle.
     min_bound_rise
@@ -165,7 +165,7 @@ class SchedulePolicy:
         While the LP's optimum is above the bound by more than this share of the gap, the root
         prices and adds no cuts. It holds in large LPs only (`LpPolicy.many_vertices`).
     settled_share
-        Share of the gap below which cuts are searched for again after that.
+        Share of the gap below which the root then searches for cuts again.
     """
 
     min_interval: int = 2
@@ -207,8 +207,8 @@ class LpPolicy:
         Maximum number of simplex steps from a basis, per row and column. Then the LP is solved from
         scratch.
     fresh_step_factor
-        Maximum number of simplex steps from scratch, as a multiple of that. Then the LP is solved
-        with looser tolerances, on which no bound rests.
+        Maximum number of simplex steps from scratch, as a multiple of the steps from a basis. Then
+        the LP is solved with looser tolerances, on which no bound rests.
     cbc_grace_s
         Time past its own limit after which the process of CBC is ended, s.
     cbc_check_interval_s
@@ -286,8 +286,8 @@ class CoverPolicy:
     patience
         Pricing passes without progress after which the next cover is tried.
     promise_decay
-        Factor on what a barrier promised at the cover below: a point goes around it differently
-        in every cover.
+        Factor on the promise that a barrier had at the cover below: the LP's point goes around it
+        differently in every cover.
     size_exponent
         Promises are divided by the number of new cells to this power: an LP over twice the cells
         takes far more than twice as long.
@@ -332,7 +332,7 @@ class GoalBoundPolicy:
     first_step
         First step of the ascent, as a multiple of Polyak's.
     step_decay
-        Factor on the step after `patience` trees that raised nothing.
+        Factor on the step after `patience` trees without a better bound.
     patience
         Trees without a better bound after which the step gets shorter.
     tour_factor
@@ -344,7 +344,8 @@ class GoalBoundPolicy:
         Maximum number of programs of the proof over goals. With hundreds of goals it would
         otherwise take as long as the proof over classes.
     max_programs_before_proof
-        Same if the proof over all classes follows, which soon makes up for a weaker bound.
+        Value of `max_programs` if the proof over all classes follows, which soon makes up for a
+        weaker bound.
     max_proven_goals
         Number of goals below which the proof over goals is always made, since it takes a second.
     """
@@ -399,8 +400,8 @@ class TimePolicy:
     cover_share
         Maximum share of the time left for covers.
     cover_classes
-        Number of classes from which on covers get that share; with fewer it falls with the square
-        of the number, as the sizes of the matrices do.
+        Number of classes from which on covers get `cover_share`; with fewer classes their share
+        falls with the square of the number, as the sizes of the matrices do.
     min_sparse_share
         Minimum share for covers where costs are sparse and goals are few (`max_sparse_goals`).
     sparse_classes

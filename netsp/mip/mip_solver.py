@@ -150,8 +150,8 @@ class MipRun(SearchingRun):
                 warm: WarmStart | None = None
                 if not walks or len(self.graph) > policy.core_classes:
                     with self.core() as core:
-                        has_many = self.graph.goal_count >= policy.many_goals
-                        if core is not None or (not self.graph.has_cost_matrix and has_many):
+                        has_many_goals = self.graph.goal_count >= policy.many_goals
+                        if core is not None or (not self.graph.has_cost_matrix and has_many_goals):
                             self.bound_by_goals(backend)
                             if self._root_is_hopeless:
                                 search_and_merge(self, self.solve_merged_tours, policy.merging)
@@ -186,7 +186,7 @@ class MipRun(SearchingRun):
             self.cut(costs, backend, warm)
 
     def starting_costs(self) -> CostMatrix:
-        """Return the costs that a proof starts from, those that a bound has measured if it has."""
+        """Return the costs that a proof starts from, already measured if a bound needed them."""
         costs, self._costs = self._costs or self._initial_costs(), None
         return costs
 
@@ -196,7 +196,7 @@ class MipRun(SearchingRun):
         if not self.uses_sparse_costs or bound is None or self.tour is None:
             return CostMatrix(graph, policy=self.gtsp_policy.costs)
         if bound.cells is None:
-            # half of the time was too little for a cover, so a search makes more of the rest
+            # half of the time was too short for a cover, so a search is the better use of the rest
             search_and_merge(self, self.solve_merged_tours, policy.merging)
             self.check()
             return CostMatrix(graph, policy=self.gtsp_policy.costs)
@@ -249,11 +249,11 @@ class MipRun(SearchingRun):
             self._costs = CostMatrix(graph, policy=self.gtsp_policy.costs)
             return self._costs.values
 
-        def keep(sparse: SparseCosts) -> None:
+        def keep_sparse(sparse: SparseCosts) -> None:
             self._costs = CostMatrix(graph, sparse, policy=self.gtsp_policy.costs)
 
         if self.uses_sparse_costs:
-            return CoverCosts(on_sparse=keep)
+            return CoverCosts(on_sparse=keep_sparse)
         is_known = self._uses_covers and graph.is_complete and self._measures_all_legs
         return CoverCosts(matrix=matrix if is_known else None)
 
@@ -266,9 +266,9 @@ class MipRun(SearchingRun):
     @property
     def _uses_covers(self) -> bool:
         """True if covers come first, which pays only with many goals and classes."""
-        has_many = self.graph.goal_count >= self.mip_policy.many_goals
+        has_many_goals = self.graph.goal_count >= self.mip_policy.many_goals
         has_many_classes = len(self.graph) > self.mip_policy.covers.min_classes
-        return (has_many_classes and has_many) or self.uses_sparse_costs
+        return (has_many_classes and has_many_goals) or self.uses_sparse_costs
 
     @property
     def uses_sparse_costs(self) -> bool:
@@ -331,8 +331,8 @@ class MipRun(SearchingRun):
         )
         yield from root.steps()
         if not self.is_done and root.point is not None:
-            before, used = self.length, np.flatnonzero(root.point.x > INTEGRALITY_TOLERANCE)
-            self.search(costs, used)
+            before, visited = self.length, np.flatnonzero(root.point.x > INTEGRALITY_TOLERANCE)
+            self.search(costs, visited)
             self.report("heuristic", **root.size())
             if costs.exact is None and self.length < before:
                 yield from root.steps()
@@ -466,7 +466,7 @@ class MipRun(SearchingRun):
                 raise RunStopped
             cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), costs.cluster)
             if not cuts:
-                # an optimal tour of the program: the bound stands at its own length
+                # the optimum is a tour, so the bound equals the length of that tour
                 break
             model.add_cuts(cuts)
 
@@ -478,5 +478,6 @@ def solve_merged(graph: Instance, limits: Limits, policy: MipPolicy = MipPolicy(
 
 
 def _load(path: str) -> Any:
+    """Return the attribute of a module that a path `module:attribute` names."""
     module, attribute = path.split(":")
     return getattr(importlib.import_module(module), attribute)

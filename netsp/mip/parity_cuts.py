@@ -118,6 +118,7 @@ def _flow(pair: Ints, odd: Bools, y: Floats, pairs: int) -> Floats:
 
 
 def _sides(odd: Bools, barriers: tuple[int, ...]) -> Bools:
+    """Return the mask (V,) of vertices whose labels hold an odd number of some barriers in all."""
     return np.asarray(np.logical_xor.reduce(odd[:, list(barriers)], axis=1))
 
 
@@ -126,12 +127,12 @@ def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
     cost = np.minimum(flow, 1.0 - flow)
     order = np.argsort(-cost.ravel(), kind="stable")
     root, turned = np.arange(clusters), np.zeros(clusters, dtype=bool)
-    at, costs = ends.tolist(), cost.ravel().tolist()
+    pair_ends, costs = ends.tolist(), cost.ravel().tolist()
     for k in order.tolist():
         p, label = divmod(k, 2)
         if costs[k] <= FLOW_TOLERANCE:
             break
-        a, b = at[p]
+        a, b = pair_ends[p]
         if root[a] != root[b]:
             # the pair does not cross if its sides differ exactly where its legs cross
             is_crossing = bool(turned[a] ^ turned[b]) != bool(label)
@@ -145,7 +146,7 @@ def _along_tree(ends: Ints, flow: Floats, clusters: int) -> Bools:
 def _cheapest(
     ends: Ints, flow: Floats, row: Ints, sides: Bools, max_passes: int
 ) -> tuple[float, Bools]:
-    """Change sides while the cost falls, and return it and the mask of pairs that are teeth.
+    """Change sides while the cost falls, and return the cost and the mask of pairs that are teeth.
 
     Parameters
     ----------
@@ -247,10 +248,12 @@ def _costs_of(across: Floats) -> tuple[Floats, Ints]:
     is_tooth = across > 0.5
     # a cumulative sum adds in the order of the pairs, as `_cost` does
     total = np.cumsum(np.where(is_tooth, 1.0 - across, across), axis=1)[:, -1]
-    off = np.abs(1.0 - 2.0 * across)
-    at = off.argmin(axis=1)
+    distance = np.abs(1.0 - 2.0 * across)
+    at = distance.argmin(axis=1)
     is_odd = np.count_nonzero(is_tooth, axis=1) % 2 == 1
-    return np.where(is_odd, total, total + off[np.arange(len(at)), at]), np.where(is_odd, -1, at)
+    return np.where(is_odd, total, total + distance[np.arange(len(at)), at]), np.where(
+        is_odd, -1, at
+    )
 
 
 __getattr__ = deprecated_names(globals(), odd_letters="odd_numbers")

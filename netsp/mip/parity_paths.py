@@ -1,10 +1,10 @@
 """Paths from the base: what it costs above a bound to reach a vertex.
 
-The bound of `netsp.mip.lagrangian_bound` counts for every vertex its two legs of least reduced
+The bound of `netsp.mip.lagrangian_bound` counts for every vertex its two legs of lowest reduced
 cost, wherever they lead. So it misses what a tour pays to go far: on the cover the classes of one
-sheet lie close together, and each looks cheap by itself. But a tour gets there from the base and
-back. Let the excess of v be r_v + half of the two least r_uv at v, less the least of its cluster,
-and let s_u be the second least r at u. Then
+sheet lie close together, and each looks cheap by itself, but a tour has to go there from the base
+and back. Let the excess of v be r_v + half of the two lowest r_uv at v, less the lowest such sum in
+the cluster of v, and let l_u and s_u be the lowest and second lowest r at u. Then
 
     length >= bound + Σ over its vertices of their excess
               + Σ over its legs of half of max(r_uv - s_u, 0) + max(r_uv - s_v, 0):
@@ -47,7 +47,7 @@ class BasePaths(NamedTuple):
 
 @kernel
 def leg_excess(u: int, v: int, price: float, terms: Terms) -> float:
-    """Return half of what a leg costs above the second cheapest legs of its ends."""
+    """Return half of the reduced cost of a leg above the second cheapest legs of its ends."""
     above = max(price - terms.second[u], 0.0) + max(price - terms.second[v], 0.0)
     return float(0.5 * above)
 

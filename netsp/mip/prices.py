@@ -1,7 +1,8 @@
 """Reduced costs of all legs: one pass for the Lagrangian bound, one for reduced-cost fixing.
 
 The bound is that of `netsp.mip.lagrangian_bound`. A tour through a given vertex, or along a given
-leg, costs at least the bound and what these cost above the cheapest choice of their clusters.
+leg, costs at least the bound plus the excess of that vertex or leg over the cheapest choice in its
+clusters.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Prices:
         lowest, second, vertex = terms.lowest, terms.second, terms.vertex
         longest = np.empty(self._size)
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
-        self._more = lowest < 0.0
+        self._has_more = lowest < 0.0
         self._cost = vertex + 0.5 * (lowest + second)
         self._cheapest = lowest_of_clusters(self._cost, cluster)
         fixed = float((duals.cluster + self._cheapest).sum()) + duals.constant
@@ -104,14 +105,14 @@ class Prices:
         They are the `candidates_per_vertex` most negative legs of each vertex. In a later call,
         after costs have risen, vertices that had fewer such legs are skipped.
         """
-        rows, count = np.flatnonzero(self._more), self.policy.candidates_per_vertex
+        rows, count = np.flatnonzero(self._has_more), self.policy.candidates_per_vertex
         other = np.full((self._size, count), -1, dtype=np.int64)
         price = np.zeros((self._size, count))
         terms = self._terms
         self._by_rows(
             lambda a, b: _most_negative(rows[a:b], terms, tolerance, other, price), len(rows)
         )
-        self._more = other[:, -1] >= 0
+        self._has_more = other[:, -1] >= 0
         u, k = np.nonzero(other >= 0)
         pairs = np.sort(np.column_stack([u, other[u, k]]), axis=1)
         legs, where = np.unique(pairs.reshape(-1, 2), axis=0, return_index=True)
@@ -181,7 +182,7 @@ def _alive_legs(dead: DeadLegs | SparseCosts) -> tuple[Bits, Rows]:
 
 @kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
-    """Find the two least reduced costs of each row, and the largest absolute one."""
+    """Find the two lowest reduced costs of each row, and the largest absolute one."""
     other, price, shared = work_arrays(terms)
     for u in range(first, last):
         lowest = second = np.inf

@@ -101,6 +101,8 @@ class Point:
         (V,) value of each vertex.
     legs, y
         (k, 2) legs of the program, and (k,) their values.
+    objective
+        Value of the objective, in the units of costs.
     duals, slack
         Dual values, and the slack of each cut, of an LP; None of an integer program.
     """

@@ -36,7 +36,7 @@ class ReducedParams(Params):
     Attributes
     ----------
     classes
-        Number of classes of each goal, those of shortest tether.
+        Number of classes of each goal; classes of shortest tether are kept.
     polish
         1 to choose the classes along the order found exactly, 0 to keep them, as in the paper.
     max_polished
@@ -63,7 +63,7 @@ def solve(
     """Solve the TSP over the classes of shortest tether.
 
     The tour is optimal for those classes only, so no bound is claimed for the problem unless they
-    are all that there are. An iteration is one of `netsp.mip.mip_solver`.
+    are all that there are. An iteration is one of `mip`: one program solved.
     """
     chosen, limits = params or ReducedParams(), limits or Limits()
     kept = cheapest_per_cluster(graph.costs_to_base, graph.cluster, chosen.classes)

@@ -81,16 +81,16 @@ class Root:
         self.best: BoundProof | None = None
         goal_cuts = [] if goal_bound is None else self._adopt(goal_bound)
         # without an incumbent, a program with some of the legs may be infeasible when a tour exists
-        usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
-        warm = warm if usable else None
+        is_usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
+        warm = warm if is_usable else None
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
         if costs.measures_single_legs:
             costs.measure_legs(legs)
         self.lp = relaxation(costs.cluster, legs, costs.costs_of(legs), policy)
         if warm is not None:
             self.lp.add_cuts(warm.lifted_cuts(costs))
-        # with these, and the cuts of pairs that `subtours.goal_cuts` finds, the LP does not fall
-        # below that over goals, whatever the classes
+        # with the goals' cuts, and the cuts of pairs that `subtours.goal_cuts` finds, the LP's
+        # optimum is no lower than the optimum over goals, whatever the classes
         self.lp.add_cuts(goal_cuts, for_good=True)
         self.point: Point | None = None
         self._objective, self._reached = 0.0, 0.0
@@ -125,7 +125,7 @@ class Root:
             if run.is_done:
                 return
             if self.point is None or self._add_missing_tour_legs():
-                continue  # vertices were removed, or a new incumbent came with legs of its own
+                continue  # vertices were removed, or a new incumbent brought legs into the LP
             share = policy.settled_share if is_settling else policy.settle_share
             is_settling = priced and self._pricing_dominates(point, share)
             if is_settling:
@@ -205,8 +205,8 @@ class Root:
     def _adopt(self, goal_bound: GoalBound) -> list[Cut]:
         """Fix out what a program over goals or cells excludes, and return its cuts.
 
-        Of cuts over cells, only those with a price are returned: all of them would make LPs half as
-        slow again.
+        Of cuts over cells, only cuts with a price are returned: with all of them, LPs would take
+        half as long again.
         """
         run, costs = self.run, self.costs
         found = goal_bound.cells
@@ -337,7 +337,7 @@ class Root:
     def _measure_used(self, point: Point) -> bool:
         """Measure the legs that the point uses and that are only estimated.
 
-        Return whether there were any. What these estimates miss, the LP's bound misses.
+        Return whether there were any. The LP's bound is too low by what these estimates miss.
         """
         is_used = point.y > self.policy.pricing.min_measured_use
         if not self.costs.measure_legs(point.legs[is_used]):
@@ -458,7 +458,7 @@ class Root:
     def purge(self, point: Point, *, risen: bool) -> None:
         """Count a round of all cuts, and remove idle ones if the bound has risen.
 
-        On a plateau they would only come back.
+        While the bound does not rise, separation would only find them again.
         """
         assert point.slack is not None
         assert point.duals is not None

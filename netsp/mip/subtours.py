@@ -77,12 +77,12 @@ def strongest_cut(
 ) -> tuple[float, Cut]:
     """Return the largest violation of y(δ(S ∪ C)) >= 2 over all clusters C, and its cut.
 
-    All of C in S is stronger than a part of it: by (3) the cut is y(E(S)) <= x(S \\ C), and more of
-    C adds to the left side alone.
+    With all of C in S the cut is stronger than with a part: by (3) the cut is
+    y(E(S)) <= x(S \\ C), and more of C adds to the left side alone.
     """
     ends = cluster[legs]
     u, v = inside[legs].T
-    # by cluster, half of what the violation gains when all of it is in S
+    # half of the gain in violation if all of a cluster is in S, by cluster
     gain = np.zeros(int(cluster.max()) + 1)
     np.add.at(gain, cluster[inside], x[inside])
     np.add.at(gain, ends[u & ~v, 1], y[u & ~v])
@@ -244,7 +244,7 @@ def heaviest_walk(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
     left[0] = False
     order, current = [0], 0
     while left.any():
-        # also where no leg leads on, another cluster is next
+        # the small constant picks a cluster even if no leg leads to any
         current = int(np.argmax(np.where(left, weight[current] + 1e-9, -1.0)))
         left[current] = False
         order.append(current)
