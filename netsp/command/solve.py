@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     warm = None
     if args.warm_start:
         warm = clock.bounded("reading --warm-start", lambda: Solution.load(args.warm_start))
-        if text := warm_starts.told(problem, warm):
+        if text := warm_starts.edit_message(problem, warm):
             messages.note(text)
     rows: list[Progress] = []
     table = None if args.quiet else ProgressTable(sys.stderr, args.policy)

@@ -27,7 +27,7 @@ def to_solution(
     seed: int | None,
     timings: Timings | None = None,
 ) -> Solution:
-    """Write a solver's result as a solution of the problem, its path drawn."""
+    """Return a solver's result as a solution of the problem, with the path of its tour."""
     if isinstance(result.trajectory, BlindTrajectory):
         visits, path = _blind_visits(problem, result.trajectory), result.trajectory.path
         wrapped = tuple(k - 1 for k in entangled(result.trajectory.word))
@@ -70,17 +70,17 @@ def _visits(problem: Problem, graph: TravelGraph, tour: Sequence[int]) -> tuple[
 
 
 def _visit(problem: Problem, goal: int, word: Word, tether: float) -> Visit:
-    own = problem.goals[goal]
+    place = problem.goals[goal]
     return Visit(
-        goal=goal, signature=word, tether_length=tether, name=own.name, position=own.position
+        goal=goal, signature=word, tether_length=tether, name=place.name, position=place.position
     )
 
 
 def _blind_visits(problem: Problem, walked: BlindTrajectory) -> tuple[Visit, ...]:
     """Return the visits of a blind baseline, with the taut tether that its path would need.
 
-    Where that is not found, the length of the path up to the visit stands in its place, with a
-    warning: the tether that is out is no longer.
+    If the taut tether is not found, the length of the path up to the visit is returned instead,
+    with a warning. It is an upper bound: the tether cannot be longer than the path.
     """
     from netsp.roadmap.paths import TautPaths, UnknownPathError
 
@@ -105,7 +105,7 @@ def _blind_visits(problem: Problem, walked: BlindTrajectory) -> tuple[Visit, ...
 
 
 def versions() -> dict[str, str]:
-    """Versions of what computed a solution."""
+    """Return the versions of Python and of the packages that compute solutions."""
     return dict(_versions())
 
 

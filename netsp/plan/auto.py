@@ -1,6 +1,6 @@
 """`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
 
-Up to about eight goals it goes through all sets of goals (`netsp.plan.exact`). Up to
+Up to about eight goals it solves by sets of goals (`netsp.plan.exact`). Up to
 `RoutePolicy.max_proven_vertices` it proves: a search finds the tour; with up to `max_walk_goals`
 goals, walks (`netsp.gtsp.dp`) bound it if costs are a matrix, which at that size mostly ends with a
 proof; cutting planes (`netsp.mip`) do the rest, or all of it, on the vertices that remain. Beyond
@@ -199,7 +199,7 @@ def _bound_by_goals(
     tour: Sequence[int] | None = None,
     on_bound: OnBound = lambda *_: None,
 ) -> float:
-    """Return a bound on the tours in any class; without a tour, the known one if there is one."""
+    """Return a bound on the tours in any class; without a tour, keep a bound that is known."""
     if tour is not None or not graph.bound_in_any_class:
         params = MipParams(policy=chosen.policy.mip)
         bound_over_goals(
@@ -230,7 +230,10 @@ def _warmed_by_few_classes(graph: Instance, chosen: Params, limits: Limits) -> L
 
 
 def _over_shortest(graph: Instance, chosen: Params, limits: Limits) -> Result:
-    """Prove over the classes of shortest tether; twice the tether of any other bounds its tours."""
+    """Prove over the classes of shortest tether.
+
+    A tour through any other class is at least twice as long as the tether of that class.
+    """
     count = chosen.policy.routes.kept_vertices // graph.goal_count
     core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, count)
     given = limits.warm_start
@@ -240,21 +243,21 @@ def _over_shortest(graph: Instance, chosen: Params, limits: Limits) -> Result:
     others[core] = False
     place = {int(v): k for k, v in enumerate(core)}
     warm = None if given is None else [place[int(v)] for v in given]
-    least = graph.min_length_through(np.flatnonzero(others))
+    min_length = graph.min_length_through(np.flatnonzero(others))
     because = "a tour by way of another class goes along its tether and back"
 
     def bound_of_whole(bound: LowerBound | None) -> LowerBound | None:
-        return None if bound is None else bound.or_elsewhere(least, graph.scope, because)
+        return None if bound is None else bound.or_elsewhere(min_length, graph.scope, because)
 
     listener = of_part(limits.on_progress, core, bound_of_whole)
     run = _mip_run(graph.subgraph(core), chosen, replace(limits, on_progress=listener))
     found = run.solve(chosen.backend, warm, walks=True)
     if found.tour is None:
-        return with_classes_left_out(found, least, graph.scope, because)
+        return with_classes_left_out(found, min_length, graph.scope, because)
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
-    elsewhere = min(least, graph.min_length_left_out)
+    elsewhere = min(min_length, graph.min_length_left_out)
     clock = Clock.from_limit(limits.time)
     if elsewhere < (whole.length or 0.0) and not clock.is_up:
         # with few goals the shortest tour in any class is known soon
         _bound_by_goals(graph, chosen, Limits(clock, rng=limits.rng))
-    return with_classes_left_out(whole, least, graph.scope, because)
+    return with_classes_left_out(whole, min_length, graph.scope, because)

@@ -38,21 +38,21 @@ def read_options(solver: Callable[..., Any], name: str, params: Mapping[str, Any
     Raises
     ------
     InputError
-        Options for a solver that takes none; an argument asked for that there is not; with a
+        Options for a solver that takes none; a required parameter that is not in `OFFERED`; with a
         dataclass, an option unknown or out of range.
     """
-    asked = _asked(solver)
-    for k in [*asked][1:]:
-        optional = asked[k].default is not Parameter.empty or asked[k].kind in VARIADIC
+    accepted = _parameters_of(solver)
+    for k in [*accepted][1:]:
+        optional = accepted[k].default is not Parameter.empty or accepted[k].kind in VARIADIC
         if k not in OFFERED and not optional:
             raise InputError(
                 f"solver {name!r}: asks for {k!r}; expected the graph, then {', '.join(OFFERED)}"
             )
     if params is not None and not isinstance(params, Mapping):
         raise InputError(f"solver {name!r}: params: expected names with values, got {params!r}")
-    if params and "params" not in asked:
+    if params and "params" not in accepted:
         raise InputError(f"solver {name!r}: unknown option {next(iter(params))!r}; it takes none")
-    kind = asked["params"].annotation if "params" in asked else None
+    kind = accepted["params"].annotation if "params" in accepted else None
     kinds = [kind, *typing.get_args(kind)]  # as `D | None`
     kind = next((k for k in kinds if isinstance(k, type) and is_dataclass(k)), None)
     if kind is not None:
@@ -69,21 +69,21 @@ def whole_numbers(values: Any) -> tuple[int, ...]:
     return tuple(int(v) for v in listed) if good else ()
 
 
-def _asked(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
+def _parameters_of(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
     """Return the parameters of a solver by name; none if it is compiled and has no signature."""
     try:
-        asked = inspect.signature(solver).parameters
+        accepted = inspect.signature(solver).parameters
     except (TypeError, ValueError):
         return MappingProxyType({})
     with suppress(Exception):  # annotations that only a type checker can read
-        asked = inspect.signature(solver, eval_str=True).parameters
-    first = next(iter(asked.values()), None)
+        accepted = inspect.signature(solver, eval_str=True).parameters
+    first = next(iter(accepted.values()), None)
     if first is None or first.kind in (Parameter.KEYWORD_ONLY, Parameter.VAR_KEYWORD):
         raise InputError(f"solver: {shown(solver)} takes no argument; expected the travel graph")
-    for k, p in [*asked.items()][1:]:
+    for k, p in [*accepted.items()][1:]:
         if p.kind is Parameter.POSITIONAL_ONLY:
             raise InputError(f"solver: {shown(solver)} takes {k!r} by place only; expected by name")
-    return asked
+    return accepted
 
 
 def call(
@@ -95,17 +95,18 @@ def call(
 
     It returns a `Result`, or a tour as vertices from 0 on (then no bound is claimed), or None if it
     found none. A tour is checked against the graph, and its length is measured here. A bound cannot
-    be checked, unless its own tour refutes it: it is taken at its word, and only beside a tour.
+    be checked except against the length of its tour, so it is trusted, and used only with a tour.
 
     Raises
     ------
     InputError
-        As `read_options`; something returned that is neither; a bound above the tour's length.
+        As in `read_options`; a return value that is neither a `Result` nor a tour; a bound above
+        the tour's length.
     """
     fields = {"params": read_options(solver, name, params), "limits": limits}
     fields |= {k: getattr(limits, k) for k in OFFERED[2:]}
-    asked = _asked(solver)
-    found = solver(graph, **{k: v for k, v in fields.items() if k in [*asked][1:]})
+    accepted = _parameters_of(solver)
+    found = solver(graph, **{k: v for k, v in fields.items() if k in [*accepted][1:]})
     claimed = found if isinstance(found, Result) else None
     tour = claimed.tour if claimed else found
     run = SolverRun(graph, limits)

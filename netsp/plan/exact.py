@@ -54,16 +54,16 @@ def solve(run: SolverRun) -> None:
             rest = s & ~(1 << c)
             if s >> c & 1 and rest and not needed[c] & ~rest:
                 inside = np.flatnonzero(np.isfinite(reach[rest]))
-                detours = reach[rest, inside, None] + costs[np.ix_(inside, members[c])]
-                reach[s, members[c]] = detours.min(axis=0, initial=np.inf)
+                lengths = reach[rest, inside, None] + costs[np.ix_(inside, members[c])]
+                reach[s, members[c]] = lengths.min(axis=0, initial=np.inf)
     run.iterations += 1
-    every = 2**n - 1
-    home = reach[every] + costs[:, 0]
-    if not np.isfinite(home).any():
+    all_goals = 2**n - 1
+    closed = reach[all_goals] + costs[:, 0]
+    if not np.isfinite(closed).any():
         run.is_infeasible = run.tour is None
         return
-    v, s, tour = int(np.argmin(home)), every, []
-    length = float(home[v])
+    v, s, tour = int(np.argmin(closed)), all_goals, []
+    length = float(closed[v])
     while s:
         tour.append(v)
         s &= ~(1 << (int(graph.cluster[v]) - 1))

@@ -44,12 +44,12 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
             "keep_order: the order of the file breaks an 'after' of its goals; expected one that "
             "keeps them all"
         )
-    every = np.arange(len(graph))
-    ahead = graph.cluster[:, None] - graph.cluster[None, :]
+    all_vertices = np.arange(len(graph))
+    steps = graph.cluster[:, None] - graph.cluster[None, :]
     last = graph.goal_count
-    needed = (np.abs(ahead) == 1) | (np.abs(ahead) == last)
+    needed = (np.abs(steps) == 1) | (np.abs(steps) == last)
     with graph.on_clock(clock):
-        instance = LayeredInstance(graph.cluster, graph.costs_among(every, needed))
+        instance = LayeredInstance(graph.cluster, graph.costs_among(all_vertices, needed))
     order = np.arange(1, last + 1, dtype=np.int64)
     length, tour = best_classes(order, instance.start, instance.costs)
     found = instance.original(tour)

@@ -1,10 +1,10 @@
 """Random worlds by the papers' recipes and others, the same on every machine.
 
 All draws come from `random.Random`, whose `random()` is guaranteed to give the same sequence for
-the same seed in every version of Python, and nothing else is drawn from numpy; what is done with
-them is adding, scaling and comparing, and square roots, which IEEE 754 rounds correctly. (Which
-goals are in reach is decided by lengths of arcs: a platform whose sine differs in the last bit
-could decide otherwise for a goal at the very end of the tether.)
+the same seed in every version of Python; numpy draws nothing. Draws are only added, scaled and
+compared, and square roots taken of them, all of which IEEE 754 rounds correctly. (Which goals are
+in reach is decided by lengths of arcs: a platform whose sine differs in the last bit could decide
+otherwise for a goal at the very end of the tether.)
 """
 
 from __future__ import annotations
@@ -79,24 +79,24 @@ def array(
 ) -> list[Obstacle]:
     """Draw circles of one radius in staggered rows, each a little off its place.
 
-    So are wave-energy converters laid out (Beels et al. 2010, the layouts of the 2016 paper).
+    Arrays of wave-energy converters look like this (Beels et al. 2010, as in the 2016 paper).
     """
     radius = _radius(draw, radii)
     rows = max(1, math.isqrt(count))
     columns = -(-count // rows)
     pitch, row_pitch = side / (columns + 0.5), side / rows
-    wander = 0.5 * min(pitch, row_pitch) - radius - MIN_GAP_SHARE * side
-    if wander <= 0.0:
+    max_offset = 0.5 * min(pitch, row_pitch) - radius - MIN_GAP_SHARE * side
+    if max_offset <= 0.0:
         raise DoesNotFitError(
             f"obstacles: {count} circles of radius {radius:.3g} do not fit into rows in a square "
             f"of side {side:g}"
         )
-    wander = min(wander, 0.15 * pitch)
+    max_offset = min(max_offset, 0.15 * pitch)
     out: list[Obstacle] = []
     for k in range(count):
         row, column = divmod(k, columns)
-        x = pitch * (column + 0.5 + 0.5 * (row % 2)) + wander * (2.0 * draw.random() - 1.0)
-        y = row_pitch * (row + 0.5) + wander * (2.0 * draw.random() - 1.0)
+        x = pitch * (column + 0.5 + 0.5 * (row % 2)) + max_offset * (2.0 * draw.random() - 1.0)
+        y = row_pitch * (row + 0.5) + max_offset * (2.0 * draw.random() - 1.0)
         out.append(Circle(center=(x, y), radius=radius))
     return out
 
@@ -159,29 +159,30 @@ def random_world(
     radii: tuple[float, float] = (10.0, 30.0),
     attempt: int = 0,
 ) -> Problem:
-    """Return a world of a family: obstacles, a random base, goals drawn among the places the tether
-    reaches.
+    """Return a world of a family: obstacles, a random base, and goals within reach of the tether.
+
+    All lengths are in the units of the problem.
 
     Parameters
     ----------
     seed : int
-        Of all draws.
+        Seed of all draws.
     family : str
         One of `FAMILIES`.
     goals : int, optional
-        How many; by default 20, in `rss2016` 5 to 10.
+        Number of goals; by default 20, in `rss2016` 5 to 10.
     obstacles : int or (int, int), optional
-        How many, or least and most, both of them included, between which their number is drawn
-        uniformly; by default 20, in `rss2016` 5 to 10. The studies of the 2017 paper, which has "up
-        to 20", draw 1 to 20.
+        Number of obstacles, or its minimum and maximum (inclusive), between which it is drawn
+        uniformly; by default 20, in `rss2016` 5 to 10. Studies of the 2017 paper, which has "up to
+        20", draw 1 to 20.
     tether_length : float
         Length of the tether.
     side : float
         Side of the square.
     radii : tuple of float
-        Least and greatest radius of the obstacles.
+        Minimum and maximum radius of the obstacles.
     attempt : int
-        Another world of the same seed, for when one does not fit.
+        Number of the world among the worlds of the seed, from 0; for when one does not fit.
 
     Raises
     ------
@@ -221,10 +222,10 @@ def random_world(
     for _ in range(MAX_DRAWS // 100):
         drawn = [place() for _ in range(4 * goals)]
         drawn = [p for p in drawn if free(*p) and math.dist(p, base) <= tether_length]
-        for some in (drawn[: 2 * goals], drawn[2 * goals :]):
-            if some and len(found) < goals:
-                reach = _reach(world(some))
-                found += [p for p, d in zip(some, reach, strict=True) if d <= tether_length]
+        for batch in (drawn[: 2 * goals], drawn[2 * goals :]):
+            if batch and len(found) < goals:
+                reach = _reach(world(batch))
+                found += [p for p, d in zip(batch, reach, strict=True) if d <= tether_length]
         if len(found) >= goals:
             return world(found[:goals])
     raise DoesNotFitError(
@@ -252,11 +253,11 @@ def reachable_world(seed: int, *, max_worlds: int = 50, **recipe: object) -> tup
     Parameters
     ----------
     seed : int
-        Of all draws.
+        Seed of all draws.
     max_worlds : int
         Maximum number of worlds that are drawn.
     **recipe : object
-        As of `random_world`.
+        Arguments of `random_world`.
 
     Returns
     -------
@@ -268,7 +269,7 @@ def reachable_world(seed: int, *, max_worlds: int = 50, **recipe: object) -> tup
     Raises
     ------
     InputError
-        None of `max_worlds` worlds fits, or no draw can mend it.
+        None of `max_worlds` worlds fits, or an argument is wrong, whatever is drawn.
     """
     for attempt in range(max_worlds):
         try:
@@ -291,12 +292,12 @@ def _check(
         raise InputError(f"family: unknown {family!r}; expected one of {', '.join(FAMILIES)}")
     if goals is not None and not 1 <= goals <= MAX_COUNT:
         raise InputError(f"world: goals: expected 1 to {MAX_COUNT}, got {goals}")
-    least, most = obstacles if isinstance(obstacles, tuple) else (obstacles or 0, obstacles or 0)
-    for count in (least, most):
+    low, high = obstacles if isinstance(obstacles, tuple) else (obstacles or 0, obstacles or 0)
+    for count in (low, high):
         if not 0 <= count <= MAX_COUNT:
             raise InputError(f"world: obstacles: expected 0 to {MAX_COUNT}, got {count}")
-    if least > most:
-        raise InputError(f"world: obstacles: expected minimum <= maximum, got {least} and {most}")
+    if low > high:
+        raise InputError(f"world: obstacles: expected minimum <= maximum, got {low} and {high}")
     for name, value in (("tether_length", tether_length), ("side", side), ("radii", radii[1])):
         if not 0.0 < value <= 1e11:
             raise InputError(f"world: {name}: expected more than 0 and at most 1e11, got {value:g}")
@@ -309,7 +310,7 @@ def _check(
 def _circles(
     candidates: Iterator[tuple[float, float, float]], count: int, side: float
 ) -> list[Obstacle]:
-    """Return the first candidates that keep apart."""
+    """Return circles of the first candidates that keep the minimum gap, `count` of them."""
     taken: list[tuple[float, float, float]] = []
     for _ in range(MAX_DRAWS):
         if len(taken) == count:
@@ -322,7 +323,7 @@ def _circles(
 
 
 def _rectangle(center: Place, along: Place, long: float, half: float) -> Polygon:
-    """Return the rectangle of half axes `long` and `half`, its first axis in a given direction."""
+    """Return the rectangle of half lengths `long` along a unit vector and `half` across it."""
     (x, y), (c, s) = center, along
     corners = ((-long, -half), (long, -half), (long, half), (-long, half))
     return Polygon(polygon=tuple((x + a * c - b * s, y + a * s + b * c) for a, b in corners))
@@ -341,21 +342,24 @@ def _holds(shape: Obstacle, x: float, y: float) -> bool:
 
 
 def _apart(shape: Polygon, other: Obstacle, gap: float) -> bool:
-    """Return whether an edge of one of two convex polygons separates them by a gap."""
+    """Return whether an edge of one of two convex polygons separates them by more than a gap."""
     assert isinstance(other, Polygon)
     for one, two in ((shape.polygon, other.polygon), (other.polygon, shape.polygon)):
         for a, b in zip(one, (*one[1:], one[0]), strict=True):
             nx, ny = b[1] - a[1], a[0] - b[0]
             size = math.sqrt(nx * nx + ny * ny)
-            own = [nx * p[0] + ny * p[1] for p in one]
-            theirs = [nx * p[0] + ny * p[1] for p in two]
-            if min(theirs) - max(own) > gap * size or min(own) - max(theirs) > gap * size:
+            projected = [nx * p[0] + ny * p[1] for p in one]
+            other_projected = [nx * p[0] + ny * p[1] for p in two]
+            if (
+                min(other_projected) - max(projected) > gap * size
+                or min(projected) - max(other_projected) > gap * size
+            ):
                 return True
     return False
 
 
 def _reach(problem: Problem) -> list[float]:
-    """Shortest tether that reaches each goal."""
+    """Return the length of the shortest tether that reaches each goal."""
     from netsp.roadmap.outline import build_outline
     from netsp.roadmap.shortest import ContactGraph
 

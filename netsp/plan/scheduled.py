@@ -39,7 +39,7 @@ from netsp.plan.solve_policy import SolvePolicy
 
 
 def solve(graph: Instance, backend: str, policy: SolvePolicy, limits: Limits) -> Result:
-    """Solve by tasks that share the time; an iteration is one that a task counts as its own."""
+    """Solve by tasks that share the time; iterations are those of the tasks."""
     run = ScheduledRun(graph, limits, policy)
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
@@ -83,10 +83,10 @@ class ScheduledRun(MipRun):
         if self.tour is None:
             return math.inf
         bound = LowerBound(max(self.bound or 0.0, 0.0), self.graph.scope)
-        asked = self.graph.bound_for_problem(bound)
-        if asked is None:
+        problem_bound = self.graph.bound_for_problem(bound)
+        if problem_bound is None:
             return self.length
-        return 0.0 if asked.proves(self.length) else self.length - asked.length
+        return 0.0 if problem_bound.proves(self.length) else self.length - problem_bound.length
 
 
 class Portfolio:
@@ -175,7 +175,7 @@ class Portfolio:
         core = cheapest_per_cluster(
             graph.costs_to_base, graph.cluster, run.searched_classes_per_goal
         )
-        vain = 0
+        vain_searches = 0
         while True:
             before = run.length
             core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
@@ -184,10 +184,10 @@ class Portfolio:
             yield
             if run.tour is None:
                 return
-            vain = 0 if run.length < before else vain + 1
+            vain_searches = 0 if run.length < before else vain_searches + 1
             core = run.classes_near_incumbent() if len(graph) > len(core) else core
-            if vain == policy.max_vain_searches:
-                vain = 0
+            if vain_searches == policy.max_vain_searches:
+                vain_searches = 0
                 yield from self._merge()
 
     def _merge(self) -> Steps[None]:
@@ -243,7 +243,7 @@ class Portfolio:
         self.costs = costs
 
     def _core(self) -> Steps[None]:
-        """Prove over a core of the classes; its bound holds with twice the tether of the others."""
+        """Prove over a core of the classes; twice the tether of any other bounds its tours."""
         run, graph = self.run, self.graph
         near = run.classes_near_incumbent() if run.tour is not None else None
         core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
@@ -296,5 +296,5 @@ class Portfolio:
 
 
 def _prove_nothing(graph: Instance, limits: Limits) -> tuple[Result, Sequence[Cut]]:
-    """Return no bound: the first cover is that of the goals."""
+    """Return no bound, because the first cover, whose cells are the goals, gives one."""
     return Result(None, None, None, Status.NO_SOLUTION_FOUND, ()), ()

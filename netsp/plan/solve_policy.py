@@ -21,8 +21,8 @@ class RoutePolicy:
         Number of vertices up to which `mip` bounds a tour; the taut roadmap keeps as many unless it
         is asked for more.
     max_walk_goals
-        Number of goals up to which walks come before cuts. With more, remembering them takes longer
-        than cuts do.
+        Number of goals up to which walks come before cuts. With more goals, walks that remember
+        them take longer than cuts.
     kept_vertices
         Approximate number of vertices, those of shortest tether, that are proven over if there are
         more than `max_proven_vertices` and few goals.
@@ -66,7 +66,8 @@ class SubsetPolicy:
     Attributes
     ----------
     max_sums
-        Maximum number of sums; the default takes about a quarter of a second. With 0, none are.
+        Maximum number of sums; the default takes about a quarter of a second. With 0, no
+        problem is solved this way.
     sums_per_call
         Sums that take as long as one call of NumPy; each set is extended by each goal in one call.
     max_vertices
@@ -205,7 +206,8 @@ class SolvePolicy:
     routes
         Solver by size, and time of its parts.
     scheduler, task_times
-        Slices of time for solvers that share it (`netsp.plan.scheduled`), and estimates of theirs.
+        Slices of time for tasks that share it (`netsp.plan.scheduled`), and the estimated times of
+        the tasks.
     subsets
         Dynamic programming over sets of goals.
     search_effort
@@ -221,7 +223,7 @@ class SolvePolicy:
     drawing_time_share
         Share of the time kept for drawing the tour, if a roadmap was cut short.
     max_drawing_s
-        Maximum of that time, s.
+        Maximum time kept for drawing the tour, s.
     """
 
     routes: RoutePolicy = RoutePolicy()

@@ -354,9 +354,9 @@ def solve(
             on_progress=on_progress,
             should_stop=should_stop,
         )
-        own = ProblemReference(name=problem.name, sha256=problem.sha256)
+        reference = ProblemReference(name=problem.name, sha256=problem.sha256)
         return found.model_copy(
-            update={"problem": own, "margin": float(margin), "slack": float(slack)}
+            update={"problem": reference, "margin": float(margin), "slack": float(slack)}
         )
     if problem.visits < len(problem.goals) and _walks_between_places(solver):
         return _over_nearest_places(
@@ -381,7 +381,7 @@ def solve(
         options: dict[str, Any] = dict(roadmap_options or {})
         if ROADMAPS.named(roadmap).seeded:
             options.setdefault("seed", seed)
-        most = max_turning(friction, max_tension_ratio)
+        max_turn_rad = max_turning(friction, max_tension_ratio)
         with until_interrupt(clock) as rest:
             try:
                 graph = rest.bounded(
@@ -389,7 +389,7 @@ def solve(
                     lambda: _within_turning(
                         problem,
                         travel_graph(problem, roadmap, **{"time_limit": rest, **options}),
-                        most,
+                        max_turn_rad,
                         rest,
                     ),
                     winds_down=True,
@@ -510,9 +510,9 @@ def _over_nearest_places(problem: Problem, solver: SolverLike, **more: Any) -> S
     goals = tuple(problem.goals[k].model_copy(update={"choice": None}) for k in chosen)
     found = solve(problem.model_copy(update={"goals": goals}), solver, **more)
     visits = tuple(v.model_copy(update={"goal": chosen[v.goal]}) for v in found.tour)
-    own = ProblemReference(name=problem.name, sha256=problem.sha256)
-    none = {"lower_bound": None, "lower_bound_of": None, "gap": None}
-    return found.model_copy(update={"problem": own, "tour": visits, **none})
+    reference = ProblemReference(name=problem.name, sha256=problem.sha256)
+    no_bound = {"lower_bound": None, "lower_bound_of": None, "gap": None}
+    return found.model_copy(update={"problem": reference, "tour": visits, **no_bound})
 
 
 def _tension_ratio(value: float | None, friction: float) -> float | None:
@@ -523,15 +523,18 @@ def _tension_ratio(value: float | None, friction: float) -> float | None:
     return checked_argument("max_tension_ratio", value, 1.0 + 1e-9, 1e6)
 
 
-def _within_turning(problem: Problem, graph: TravelGraph, most: float, clock: Clock) -> TravelGraph:
-    if math.isinf(most):
+def _within_turning(
+    problem: Problem, graph: TravelGraph, max_turn_rad: float, clock: Clock
+) -> TravelGraph:
+    """Return the graph without classes that turn the tether by more than an angle, radians."""
+    if math.isinf(max_turn_rad):
         return graph
     if graph.start is not None:
         raise InputError("max_tension_ratio: a tour from a state has no such limit; expected none")
     from netsp.roadmap.turning import limit_turning
 
     with graph.on_clock(clock):
-        return limit_turning(problem, graph, most)
+        return limit_turning(problem, graph, max_turn_rad)
 
 
 def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
@@ -548,8 +551,8 @@ def _for_grown(warm: Solution, problem: Problem, grown: Problem) -> Solution:
     """Return a warm start of a problem as one of the problem with its obstacles grown."""
     if warm.problem.sha256 != problem.sha256:
         return warm
-    own = ProblemReference(name=grown.name, sha256=grown.sha256)
-    return warm.model_copy(update={"problem": own})
+    reference = ProblemReference(name=grown.name, sha256=grown.sha256)
+    return warm.model_copy(update={"problem": reference})
 
 
 def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:

@@ -64,7 +64,7 @@ class RoadmapKind:
 
     @property
     def ours(self) -> bool:
-        """True if the solver is part of netsp, so that its exceptions are defects of netsp."""
+        """True if the roadmap is part of netsp, so that its exceptions are defects of netsp."""
         return self.build.startswith("netsp.")
 
 

@@ -3,11 +3,11 @@
 Such a roadmap holds the classes of shortest tether. Over open water with many thin obstacles these
 are much alike: they differ in the side on which a tether passes obstacles half way, and tours among
 them keep returning towards the base. A good tour goes on from goal to goal and carries the tether
-along. So from each class of a tour the tether is carried to the goals near by along the shortest
-path; the classes that it comes into join the graph, a search over these few finds a better tour,
-and so on until none is found. The search begins with a short order along straight lines, along
-which the tether is carried as well; whatever it wraps on the way, back along it the robot comes
-home free. From a warm start the tether is carried in the same way.
+along. So from each class of a tour the tether is carried to nearby goals along the shortest paths.
+The classes that it ends in join the graph, and a search over these few classes finds a better tour,
+until a search finds none. The first tour is a short one over straight lines, along which the tether
+is carried as well; whatever the tether wraps on the way, the robot frees it by driving back along
+it. From a warm start the tether is carried in the same way.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from netsp.plan.solve_policy import CarryPolicy
 from netsp.roadmap.travel_graph import TravelGraph
 
 Class = tuple[int, Word]
-"""Goal, from 1, and word."""
+"""Homotopy class of the tether at a goal: number of the goal, from 1, and word."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def with_carried(
         return Carried(graph, None if start is None else tuple(start))
     share = clock.part(policy.time_share)
     paths = {0: carrier.ways(0, graph.goal_count)}
-    least = cheapest_per_cluster(graph.costs_to_base, graph.cluster, policy.first_classes)
-    first = _classes(graph, least)
+    core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, policy.first_classes)
+    first = _classes(graph, core)
     best: list[Class] = []
     shortest = np.inf
     if start is not None:
@@ -151,8 +151,8 @@ class _Columns:
         policy = self.policy
         limit = min(policy.max_classes, policy.max_classes_per_goal * graph.goal_count)
         best: list[Class] = []
-        shortest, vain = np.inf, 0
-        while not self.clock.is_up and vain < policy.max_vain_searches:
+        shortest, vain_searches = np.inf, 0
+        while not self.clock.is_up and vain_searches < policy.max_vain_searches:
             try:
                 with graph.on_clock(self.clock):
                     length, classes = self._search(graph, list(searched), best)
@@ -171,11 +171,11 @@ class _Columns:
             wanted = self._carried(graph, [*(searched if from_all else (*best, *classes))])
             new = [c for c in wanted if c not in searched]
             graph = _with_classes(graph, new, searched, self.clock)
-            vain = 0 if improved else vain + 1
+            vain_searches = 0 if improved else vain_searches + 1
         return graph, shortest, best
 
     def _carried(self, graph: TravelGraph, classes: list[Class]) -> dict[Class, None]:
-        """Return the classes that the tether comes into from the base and from some classes."""
+        """Return the classes that the tether comes into, carried from the base and some classes."""
         carrier = graph.carrier
         assert carrier is not None
         wanted: dict[Class, None] = {}
@@ -205,24 +205,26 @@ class _Columns:
 def _along_straight_lines(
     graph: TravelGraph, rng: np.random.Generator, clock: Clock, policy: CarryPolicy = CarryPolicy()
 ) -> list[Class]:
-    """Return the classes that the tether comes into along a short tour over straight lines.
+    """Return the classes in which the tether ends along a short tour over straight lines.
 
-    Where it does not reach the next goal, it goes on from that goal's class of shortest tether. The
-    list is shorter if the clock is up.
+    Where the tether does not reach the next goal, it continues from the class of shortest tether of
+    that goal. The list is shorter if the clock is up.
     """
     carrier = graph.carrier
     assert carrier is not None
-    apart, places = graph.distances_between_goals(lambda: True), np.arange(graph.goal_count + 1)
-    instance = LayeredInstance(places, apart, places, graph.before)
+    distances, places = graph.distances_between_goals(lambda: True), np.arange(graph.goal_count + 1)
+    instance = LayeredInstance(places, distances, places, graph.before)
     _, tour = _search(instance, rng, None, clock, policy)
-    shortest = dict(_classes(graph, cheapest_per_cluster(graph.costs_to_base, graph.cluster, 1)))
+    shortest_word = dict(
+        _classes(graph, cheapest_per_cluster(graph.costs_to_base, graph.cluster, 1))
+    )
     out: list[Class] = []
     word: Word = ()
     for start, goal in pairwise(tour):
         if clock.is_up:
             break
         carried = carrier.carried(start, word, goal)
-        word = shortest[goal] if carried is None else carried
+        word = shortest_word[goal] if carried is None else carried
         out.append((goal, word))
     return out
 
@@ -230,7 +232,7 @@ def _along_straight_lines(
 def _with_classes(
     graph: TravelGraph, new: list[Class], searched: dict[Class, None], clock: Clock
 ) -> TravelGraph:
-    """Return the graph with more classes, and add those that the tether reaches to `searched`."""
+    """Return the graph with more classes; the new ones that the tether reaches join `searched`."""
     assert graph.carrier is not None
     order = graph.before
     graph = graph.carrier.with_classes(new, lambda: clock.is_up)

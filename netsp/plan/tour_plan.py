@@ -26,7 +26,7 @@ class Leg(ComparesArrays):
     goal
         Number of the goal in the problem, HOME for the base.
     path
-        (k, 3); the first point is the end of the leg before.
+        (k, 3) points; the first one is the end of the previous leg.
     word, tether
         Word and length of the tether at the goal.
     """
@@ -58,11 +58,11 @@ def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = No
     path = np.array(solution.path)
     rays = problem.representative_points
     before = np.array(solution.start_tether).reshape(-1, 3)
-    place = 1e-6 * problem.scale
+    tolerance = 1e-6 * problem.scale
     legs, at = [], 0
     for visit in solution.tour:
         target = np.array(problem.goals[visit.goal].position)
-        near = at + np.flatnonzero(np.linalg.norm(path[at:] - target, axis=1) <= place)
+        near = at + np.flatnonzero(np.linalg.norm(path[at:] - target, axis=1) <= tolerance)
         # of several points of the path at the goal, take the one with the stated word
         words = (signature(np.vstack([before, path[: k + 1]])[:, :2], rays) for k in near)
         k = next((k for k, w in zip(near, words, strict=True) if w == visit.signature), None)

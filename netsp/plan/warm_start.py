@@ -1,9 +1,9 @@
-"""Warm starts, also from the solution of an older version of a problem.
+"""Warm starts from a solution of the problem, or of an older version of it.
 
-Goals are identified by name, and those without by place; obstacles by where the old path passes
-them: the words are those that the path writes among the present obstacles. New goals are inserted
-where they lengthen the tour least, removed goals are left out, and where a class is not in the
-travel graph, the best classes for the order are chosen.
+Goals are identified by name, or by place if they have none. Obstacles are not identified: words are
+read from the crossings of the old path with the rays of the present obstacles. New goals are
+inserted where they lengthen the tour least, removed goals are left out, and where a class is not in
+the travel graph, the best classes for the order are chosen.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock
+from netsp.base.deprecated import deprecated_names
 from netsp.base.errors import InputError
 from netsp.gtsp.instance import cheapest_per_cluster
 from netsp.gtsp.search import LayeredInstance, best_classes
@@ -106,10 +107,10 @@ def old_tour(
 
 def _nearest(problem: Problem, place: Floats, taken: set[int], policy: WarmStartPolicy) -> int:
     """Return the goal at a place that is not taken yet; -1 for none."""
-    away = np.linalg.norm(problem.points[1:] - place, axis=1)
-    away[list(taken)] = np.inf
-    k = int(np.argmin(away))
-    return k if away[k] <= policy.max_goal_move * problem.scale else -1
+    distance = np.linalg.norm(problem.points[1:] - place, axis=1)
+    distance[list(taken)] = np.inf
+    k = int(np.argmin(distance))
+    return k if distance[k] <= policy.max_goal_move * problem.scale else -1
 
 
 def with_old_classes(
@@ -186,13 +187,13 @@ def tour_from(
 def _insert(order: list[int], c: int, points: Floats, place_of: dict[int, int]) -> None:
     """Insert a cluster where it lengthens the tour least, in straight lines."""
     visits = points[[0, *(place_of[k] + 1 for k in order), 0]]
-    away = np.linalg.norm(visits - points[place_of[c] + 1], axis=1)
-    more = away[:-1] + away[1:] - np.linalg.norm(np.diff(visits, axis=0), axis=1)
-    order.insert(int(np.argmin(more)), c)
+    distances = np.linalg.norm(visits - points[place_of[c] + 1], axis=1)
+    increase = distances[:-1] + distances[1:] - np.linalg.norm(np.diff(visits, axis=0), axis=1)
+    order.insert(int(np.argmin(increase)), c)
 
 
-def told(problem: Problem, solution: Solution) -> str | None:
-    """Return a message about what became of a solution's goals; None if nothing was edited."""
+def edit_message(problem: Problem, solution: Solution) -> str | None:
+    """Return a message with the numbers of old, new and removed goals; None without an edit."""
     if solution.problem.sha256 == problem.sha256 or not solution.tour:
         return None
     found = old_tour(problem, solution)
@@ -203,3 +204,6 @@ def told(problem: Problem, solution: Solution) -> str | None:
     if found.gone:
         parts.append(f"{found.gone} gone")
     return "warm start: " + ", ".join(parts)
+
+
+__getattr__ = deprecated_names(globals(), told="edit_message")

@@ -59,7 +59,7 @@ def solve(
     roots = graph.roots
     with until_interrupt(limits.time) as clock:
         limits = replace(limits, time=clock)
-        best = _given(graph, limits)
+        best = _from_warm_start(graph, limits)
         if proves:
             best, roots = _search(graph, roots, limits, best, policy)
         bounds, rows = [], list[Progress]()
@@ -103,7 +103,7 @@ def solve(
     return replace(best, status=status, lower_bound=claimed, trace=tuple(rows))
 
 
-def _given(graph: BaselessInstance, limits: Limits) -> Result:
+def _from_warm_start(graph: BaselessInstance, limits: Limits) -> Result:
     """Return the warm start as a result, if there is one."""
     tour = limits.warm_start
     if tour is None:
