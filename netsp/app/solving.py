@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from netsp.app.app_policy import AppPolicy
-from netsp.base.deprecated import renamed_parameters
+from netsp.base.deprecated import deprecated_method, renamed_parameters
 
 if TYPE_CHECKING:
     from netsp.model.solution import Solution
@@ -38,11 +38,13 @@ class Worker:
     def __init__(
         self, on_message: OnMessage, time_limit: float = 60.0, policy: AppPolicy = AppPolicy()
     ) -> None:
-        self._on_message, self.time_limit, self._policy = on_message, time_limit, policy
+        self.on_message, self.time_limit, self._policy = on_message, time_limit, policy
         self._lock = threading.Lock()
         self._closed = False
         self._latest: tuple[int, str] | None = None
         self._start()
+
+    told = deprecated_method("told", "on_message")
 
     def solve(self, version: int, problem: str) -> None:
         """Solve this version from now on.
@@ -83,12 +85,12 @@ class Worker:
                 message = connection.recv()
             except (EOFError, OSError):
                 break
-            self._on_message(message)
+            self.on_message(message)
         # the process died: report the version as failed, and start another process
         with self._lock:
             if not self._closed and connection is self._connection and self._latest is not None:
                 version, _ = self._latest
-                self._on_message(
+                self.on_message(
                     {
                         "version": version,
                         "stage": "failed",

@@ -12,7 +12,7 @@ from netsp.model.problem import Problem
 
 def pushed_aside(problem: Problem, nodes: Floats, by: float) -> Floats:
     """Return the tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter
-    part of their outline, `by` outside of it.
+    part of their outline, at a distance `by` outside of it, in the problem's units.
 
     A robot inside an obstacle is taken back along the tether to where it leaves the obstacle.
     Heights stay as they are along the tether.

@@ -42,17 +42,17 @@ class ExecutionOptions:
     vehicle : str
         Name of a vehicle (`netsp.world.vehicle.VEHICLES`).
     reach : float
-        Distance at which a vehicle with dynamics has visited a goal.
+        Distance at which a vehicle with dynamics has visited a goal, in the problem's units.
     delta : float, optional
-        Resolution of the tether; by default from the problem.
+        Resolution of the tether, in the problem's units; by default from the problem.
     repair : bool
         Whether plans are repaired.
     planning_limit : float
         Seconds that a repair may take; the robot holds its place meanwhile.
     current : tuple of float
-        Velocity of the water, (x, y, z).
+        Velocity (x, y, z) of the water, length units per second.
     gusts : float
-        Standard deviation of the velocity about the current.
+        Standard deviation of the velocity about the current, length units per second.
     seed : int
         Seed of the gusts and of the solver.
     reserve_policy : ReservePolicy
@@ -83,15 +83,15 @@ class ExecutionRow:
     time : float
         Seconds since the start.
     x, y, z : float
-        Position, z up.
+        Position, z up, in the problem's units.
     goal : int
         Next goal, -1 for the base.
     mode : {"tour", "shorten", "hold"}
         What the robot is doing.
     tether : float
-        Length of the taut tether.
+        Length of the taut tether, in the problem's units.
     limit : float
-        Maximum length of the tether.
+        Maximum length of the tether, in the problem's units.
     shortening : bool
         Whether the limit was lowered below the tether, which is being shortened.
     over : bool
@@ -123,7 +123,7 @@ class Arrival:
     word, planned : Word
         Words of the tether and of the planned one.
     tether, planned_tether : float
-        Their lengths.
+        Lengths of the tether and of the planned one, in the problem's units.
     """
 
     time: float
@@ -187,7 +187,7 @@ class Execution(Drawn):
     free : bool
         Whether the tether is free at the end.
     walked : float
-        Length of the path travelled.
+        Length of the path travelled, in the problem's units.
     interrupted : bool
         Whether it was interrupted.
     wall_s : float
@@ -240,7 +240,7 @@ class Execution(Drawn):
 
     @property
     def limit_periods(self) -> list[LimitPeriod]:
-        """Tether beside each limit that it had in turn."""
+        """Longest tether under each limit, in the order of the limits."""
         t, tether, limit, _ = self._lengths
         return limit_periods(t, tether, limit)
 
@@ -263,8 +263,8 @@ class Execution(Drawn):
     def summary(self) -> dict[str, Any]:
         """Numbers of the execution.
 
-        `limits` has the tether beside each limit that it had in turn, `over_limit` every time in
-        which it was longer: `exceedance_s` is their sum, except for those after the limit was
+        `limits` has the longest tether under each limit, `over_limit` every time in which the
+        tether was longer: `exceedance_s` is their sum, except for those after the limit was
         lowered below the tether, until it fits, whose sum is `shortening_s`.
         """
         over = self.overruns

@@ -106,9 +106,12 @@ class RepairPlanner(PredictivePlanner):
     mission_policy: MissionPolicy = field(default_factory=MissionPolicy)
     _must_check: bool = False
     _hold_until_s: float = -np.inf
-    _walked: list[Floats] = field(default_factory=list)
-    _first: tuple[int, Floats] | None = None
+    # positions of the robot since the last visit
+    _walked_on_leg: list[Floats] = field(default_factory=list)
+    # number of the waypoint to which a repaired leg leads, and its path from where it was repaired
+    _first_leg: tuple[int, Floats] | None = None
     _has_new_waypoint: bool = False
+    # mission in the order of its file
     _as_given: Mission | None = None
 
     name = "repair"
@@ -128,7 +131,7 @@ class RepairPlanner(PredictivePlanner):
     def step(self, robot: Floats, tether: Tether) -> Command:
         """See `Planner`. The robot holds its place until a plan is due, even if it is ready
         earlier, so that the same seed gives the same flight."""
-        self._walked.append(np.array(robot))
+        self._walked_on_leg.append(np.array(robot))
         if self._must_check and not self.is_done and self._path_to_shorten(tether) is None:
             self._must_check = False
             begin = time.process_time()
@@ -156,12 +159,12 @@ class RepairPlanner(PredictivePlanner):
         if tour is None or k >= len(tour.stops):
             return
         stops, path = list(tour.stops), np.array(tour.stops[k].path)
-        if self._first is not None and self._first[0] == k:
-            path = self._first[1]
+        if self._first_leg is not None and self._first_leg[0] == k:
+            path = self._first_leg[1]
         del stops[k]
         onward = tour.home if k == len(stops) else stops[k].path
         leg = thinned_path(self.pull_taut(np.vstack([path, np.array(onward)])))
-        self._first = (k, np.array(leg)) if k == self.index else self._first
+        self._first_leg = (k, np.array(leg)) if k == self.index else self._first_leg
         home = tour.home
         if k == len(stops):
             home = leg
@@ -184,7 +187,7 @@ class RepairPlanner(PredictivePlanner):
 
     def _next(self) -> None:
         super()._next()
-        self._walked = self._walked[-1:]
+        self._walked_on_leg = self._walked_on_leg[-1:]
 
     def _check_and_repair(self, robot: Floats, tether: Tether) -> None:
         """Check the rest of the tour, and repair it if it no longer holds."""
@@ -390,8 +393,8 @@ class RepairPlanner(PredictivePlanner):
             stop.model_copy(update={"given_as": numbers.get(self.given[begin + k])})
             for k, stop in enumerate(stops)
         )
-        self._first = (begin, np.array(stops[0].path if stops else home))
-        walked = thinned_path(np.vstack([np.array(self._walked), self._first[1]]))
+        self._first_leg = (begin, np.array(stops[0].path if stops else home))
+        walked = thinned_path(np.vstack([np.array(self._walked_on_leg), self._first_leg[1]]))
         if stops:
             stops = (stops[0].model_copy(update={"path": walked}), *stops[1:])
         else:
@@ -407,8 +410,8 @@ class RepairPlanner(PredictivePlanner):
         self.path, self._planned = self.path[:0], -1
 
     def _planned_leg(self) -> tuple[Floats | None, float | None]:
-        if self._first is not None and self._first[0] == self.index:
-            return self._first[1], None
+        if self._first_leg is not None and self._first_leg[0] == self.index:
+            return self._first_leg[1], None
         return super()._planned_leg()
 
     def summary_fields(self) -> dict[str, Any]:
@@ -423,6 +426,6 @@ class RepairPlanner(PredictivePlanner):
         assert m is not None
         if m.tour is not None and m.tour.mismatch(m.begin, m.start, m.places, m.reach):
             return m.model_copy(update={"tour": None})
-        if m.tour is not None and self.repairs and self._first is not None:
+        if m.tour is not None and self.repairs and self._first_leg is not None:
             return m.model_copy(update={"tour": m.tour.without_bounds()})
         return m

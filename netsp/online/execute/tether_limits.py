@@ -25,7 +25,7 @@ class LimitPeriod:
     limit
         Length that the tether may have, in the problem's units.
     longest
-        Length of the longest tether in this time.
+        Length of the longest tether in this time, in the problem's units.
     longest_s
         When it was that long, seconds after the start of the run.
     """
@@ -47,7 +47,7 @@ class Overrun:
     longest
         Length of the longest tether in this time, in the problem's units.
     limit
-        Length that it may have had.
+        Limit of the tether in this time, in the problem's units.
     shortening
         Whether the limit was lowered below the tether, which was being shortened.
     """
@@ -60,12 +60,12 @@ class Overrun:
 
     @property
     def seconds(self) -> float:
-        """Return the duration."""
+        """Duration, s."""
         return self.end_s - self.begin_s
 
 
 def limit_periods(t: Floats, tether: Floats, limit: Floats) -> list[LimitPeriod]:
-    """Return the tether beside each limit that it had in turn.
+    """Return the longest tether under each limit, in the order of the limits.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def overruns(t: Floats, tether: Floats, limit: Floats, shortening: Bools) -> lis
 
 
 def describe_limits(periods: Sequence[LimitPeriod], over: Sequence[Overrun], units: str) -> str:
-    """Return words for the tether beside its limits, and for the times over them."""
+    """Return words for the longest tether under each limit, and for the times over the limits."""
     if not periods:
         return "never out"
     first, *later = periods
@@ -139,7 +139,7 @@ def _times(over: Sequence[Overrun], units: str, max_times: int = 5) -> str:
 
 
 def _runs(values: Floats) -> list[tuple[int, int]]:
-    """Return first and last index, exclusive, of the stretches of equal rows."""
+    """Return, for each stretch of equal rows, its first index and the index after its last."""
     if not len(values):
         return []
     rows = np.asarray(values).reshape(len(values), -1)

@@ -120,8 +120,8 @@ class _Run:
         self.policy = options.policy
         self.step = self._step_s()
         self.water = Water(options.current, options.gusts, options.seed)
-        self.mode, self.fresh, self.leg_s = "tour", True, 0.0
-        self.shorten = False
+        self.mode, self.is_new_path, self.time_on_leg_s = "tour", True, 0.0
+        self.is_shortening = False
         self.retreat: _Retreat | None = None
         if resume_point is None or options.reserve_policy.reserve is not None:
             self.reserve = options.reserve_policy.of_plan(problem, solution)
@@ -175,9 +175,9 @@ class _Run:
         x, y, z = (float(v) for v in self.vehicle.position)
         goal = self.left[0] if self.left else HOME
         limit = self.problem.tether_length
-        if self.shorten and self.tether.length <= limit:
-            self.shorten = False
-        goes_back = self.shorten or self.retreat is not None
+        if self.is_shortening and self.tether.length <= limit:
+            self.is_shortening = False
+        goes_back = self.is_shortening or self.retreat is not None
         mode = "shorten" if goes_back and self.mode != "hold" else self.mode
         row = ExecutionRow(
             round(self.now, 6),
@@ -188,7 +188,7 @@ class _Run:
             mode,
             self.tether.length,
             limit,
-            self.shorten,
+            self.is_shortening,
             self._is_over_limit,
         )
         if len(self.out.rows) % self.policy.tether_rows == 0:
@@ -199,12 +199,12 @@ class _Run:
     def go(self) -> None:
         """Take one step along the path; arrive where the leg ends."""
         points, passed = self.vehicle.go(
-            self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
+            self.path, self.step, self.vehicle.yaw, self.water(self.now), self.is_new_path
         )
-        self.fresh = False
+        self.is_new_path = False
         step_s = self.step if self.live is None else self.live.time - self.now
         self.now += step_s
-        self.leg_s += step_s
+        self.time_on_leg_s += step_s
         self._follow(points)
         end = self.path[-1]
         self.path = self.path[min(passed, len(self.path) - 1) :]
@@ -216,7 +216,7 @@ class _Run:
             and float(np.linalg.norm(self.vehicle.position - end)) <= max_distance
         )
         policy, leg_s = self.policy, self.legs[0].length / self.options.speed
-        is_late = self.leg_s > policy.leg_grace_s + policy.max_leg_time_ratio * leg_s
+        is_late = self.time_on_leg_s > policy.leg_grace_s + policy.max_leg_time_ratio * leg_s
         if self.retreat is not None:
             if has_arrived or is_late or self.tether.length <= self.retreat.length:
                 retreat, self.retreat = self.retreat, None
@@ -246,9 +246,9 @@ class _Run:
         self._next()
 
     def _next(self) -> None:
-        self.leg_s = 0.0
+        self.time_on_leg_s = 0.0
         if self.legs:
-            self.path, self.fresh = self.legs[0].path, True
+            self.path, self.is_new_path = self.legs[0].path, True
 
     def _leave_out(self, goal: int, why: str) -> None:
         if goal == HOME:
@@ -296,7 +296,7 @@ class _Run:
             )
             if reason is None:
                 self.legs = legs
-                self.path, self.leg_s = self.legs[0].path[1:], 0.0
+                self.path, self.time_on_leg_s = self.legs[0].path[1:], 0.0
         if reason is None:
             self._log_event(event.kind, KEPT, "the rest of the plan still holds", 0.0)
         elif not self.options.repair:
@@ -327,7 +327,7 @@ class _Run:
                 self.out.left_out.pop(cancelled, None)
                 self.out.cancelled[cancelled] = self.now
         if event.tether_length is not None and self.tether.length > event.tether_length:
-            self.shorten = True
+            self.is_shortening = True
         return left, reason
 
     def on_request(self, event: Event) -> None:
@@ -378,7 +378,7 @@ class _Run:
             self.vehicle.stop_at(line[-1])
         self.tether = self._tether_along(line)
         if self.tether.length > problem.tether_length:
-            self.shorten = True  # the event has made it longer
+            self.is_shortening = True  # the event has made it longer
 
     def _push(self, by: Floats) -> None:
         """Carry the robot off, as far as there is water."""
@@ -427,7 +427,7 @@ class _Run:
         self.retreat = _Retreat(retreat_length, why, left, event)
         # lead to the base and stop on the way: a vehicle slows down before the end of its path
         self.legs = [Leg(HOME, retreat_path, (), 0.0)]
-        self.path, self.fresh, self.leg_s = retreat_path[1:], True, 0.0
+        self.path, self.is_new_path, self.time_on_leg_s = retreat_path[1:], True, 0.0
         units = self.problem.units
         self._log_event(
             event,

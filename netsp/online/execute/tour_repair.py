@@ -45,15 +45,17 @@ class Repair:
     kind
         Response: kept, local, replan or home.
     reason
-        Reason, for the log.
+        Reason for the response, for the log.
+    legs
+        Legs of the plan, the last one home.
     left_out
         Goals that can no longer be reached, with the reason.
     length
-        Length of the rest of the tour.
+        Length of the rest of the tour, in the problem's units.
     planning_s
         Time of planning, s.
     limit
-        Length of tether that the plan may use at its goals; None if it visits none.
+        Length of tether that the plan may use at its goals; None for a plan without goals.
     """
 
     kind: str
@@ -78,7 +80,7 @@ def plan_fault(
     legs
         Rest of the plan; its first path starts at the robot.
     limit
-        Length of tether that the plan may use; by default all there is.
+        Length of tether that the plan may use; by default the whole tether.
     """
     longest = problem.tether_length if limit is None else limit.length
     rays = problem.representative_points
@@ -147,8 +149,8 @@ class RepairOptions:
     seed
         Seed of the solver.
     reserve
-        Length of tether to keep in reserve. No goal is left out for it: if one needs more, less is
-        kept.
+        Length of tether to keep in reserve, in the problem's units. No goal is left out for it: if
+        a goal needs more tether, less is kept.
     policy
         Limits of the repair.
     """

@@ -97,12 +97,17 @@ class StateGraph:
     context: PlanningContext
     states: States
     legs: dict[tuple[int, int], Floats] = field(default_factory=dict)
-    _out: list[Floats | None] = field(default_factory=list)
-    _home: list[float] = field(default_factory=list)
-    _via: dict[int, int] = field(default_factory=dict)
-    _one_way: dict[tuple[int, int], bool] = field(default_factory=dict)
+    # path from the start along the tether of each state; None if the robot has no room there
+    _paths_out: list[Floats | None] = field(default_factory=list)
+    # length of the shortest path from the start to each state, metres; inf if there is none
+    _home_lengths: list[float] = field(default_factory=list)
+    # state before on that path, for states without a path along their tether
+    _via_state: dict[int, int] = field(default_factory=dict)
+    # legs that arrive in one direction only: whether that is from the lower number to the higher
+    _is_one_way: dict[tuple[int, int], bool] = field(default_factory=dict)
+    # pairs of states whose leg is forbidden, and those whose path through the start is, too
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
-    _cut: set[tuple[int, int]] = field(default_factory=set)
+    _forbidden_via_start: set[tuple[int, int]] = field(default_factory=set)
 
     def update(self, legs: DrivenLegs, clock: Clock) -> bool:
         """Replace the legs, and find paths from the start to new states.
@@ -118,31 +123,31 @@ class StateGraph:
             Whether there was time for the paths to all states.
         """
         is_complete = True
-        for v in range(len(self._out), len(self.states.entries)):
+        for v in range(len(self._paths_out), len(self.states.entries)):
             # each waypoint needs one path, even if the time is up
             is_complete = is_complete and not clock.is_up
             is_first = self.states.at_place[self.states.entries[v].place][0] == v
-            self._out.append(self._path_along_tether(v) if is_complete or is_first else None)
-        if self.states.present is not None and self._out[self.states.present] is None:
+            self._paths_out.append(self._path_along_tether(v) if is_complete or is_first else None)
+        if self.states.present is not None and self._paths_out[self.states.present] is None:
             # the robot is at this state, and may go back along its tether whatever the clearance
-            self._out[self.states.present] = np.vstack(
+            self._paths_out[self.states.present] = np.vstack(
                 [self.context.start_tether.nodes[::-1], self.context.present_tether.nodes[1:]]
             )
         legs_by_pair = dict[tuple[int, int], Floats]()
-        self._one_way = {}
+        self._is_one_way = {}
         for v, w, path, is_two_way in legs.both_directions():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
                 legs_by_pair[pair] = path if v < w else path[::-1]
                 if not is_two_way:
-                    self._one_way[pair] = v < w
+                    self._is_one_way[pair] = v < w
         self._measure_paths_home(legs_by_pair)
         self.legs = {
             (v, w): path
             for (v, w), path in legs_by_pair.items()
-            if polylines.length(path) < self._home[v] + self._home[w]
-            or self._via.get(v) == w
-            or self._via.get(w) == v
+            if polylines.length(path) < self._home_lengths[v] + self._home_lengths[w]
+            or self._via_state.get(v) == w
+            or self._via_state.get(w) == v
         }
         return is_complete
 
@@ -158,22 +163,26 @@ class StateGraph:
         has no room there, through other states."""
         legs_from: dict[int, list[tuple[int, float]]] = {}
         for (v, w), path in legs.items():
-            if (v, w) in self._one_way:
+            if (v, w) in self._is_one_way:
                 continue
             length = polylines.length(path)
             legs_from.setdefault(v, []).append((w, length))
             legs_from.setdefault(w, []).append((v, length))
-        self._home = [np.inf if path is None else polylines.length(path) for path in self._out]
-        self._via = {}
-        waiting = [(length, v) for v, length in enumerate(self._home) if np.isfinite(length)]
+        self._home_lengths = [
+            np.inf if path is None else polylines.length(path) for path in self._paths_out
+        ]
+        self._via_state = {}
+        waiting = [
+            (length, v) for v, length in enumerate(self._home_lengths) if np.isfinite(length)
+        ]
         heapq.heapify(waiting)
         while waiting:
             length, v = heapq.heappop(waiting)
-            if length > self._home[v] or not self._has_clearance(v):
+            if length > self._home_lengths[v] or not self._has_clearance(v):
                 continue
             for w, leg in legs_from.get(v, ()):
-                if self._out[w] is None and length + leg < self._home[w]:
-                    self._home[w], self._via[w] = length + leg, v
+                if self._paths_out[w] is None and length + leg < self._home_lengths[w]:
+                    self._home_lengths[w], self._via_state[w] = length + leg, v
                     heapq.heappush(waiting, (length + leg, w))
 
     def _has_clearance(self, v: int) -> bool:
@@ -190,7 +199,7 @@ class StateGraph:
         count = len(self.context.mission.waypoints)
         found = {
             int(places.waypoint[s.place])
-            for s, length in zip(self.states.entries, self._home, strict=False)
+            for s, length in zip(self.states.entries, self._home_lengths, strict=False)
             if np.isfinite(length)
         }
         return {n for n in found if n < count}
@@ -209,14 +218,14 @@ class StateGraph:
     def path_out(self, v: int) -> Floats | None:
         """Return the path (k, 3) from the start to a state, metres; None if the robot cannot get
         there."""
-        return self._path_out(v) if np.isfinite(self._home[v]) else None
+        return self._path_out(v) if np.isfinite(self._home_lengths[v]) else None
 
     def _path_out(self, v: int) -> Floats:
         """Return the path (k, 3) from the start to a state that the robot can get to."""
-        path = self._out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
+        path = self._paths_out[v] if v >= 0 else self.context.start_tether.nodes[-1:]
         if path is not None:
             return path
-        u = self._via[v]
+        u = self._via_state[v]
         leg = self.legs[min(u, v), max(u, v)]
         return np.vstack([self._path_out(u), (leg if u < v else leg[::-1])[1:]])
 
@@ -224,23 +233,23 @@ class StateGraph:
         """Remove the leg between two states, the lower number first, or their path through the
         start if there is no leg; return whether the states are still connected."""
         if self.legs.pop(pair, None) is None:
-            self._cut.add(pair)
+            self._forbidden_via_start.add(pair)
         else:
             self._measure_paths_home(self.legs)
         self._forbidden.add(pair)
-        return pair not in self._cut
+        return pair not in self._forbidden_via_start
 
     def can_reach_all(self, tour: Sequence[int]) -> bool:
         """Return whether the robot gets from the start to every state of a tour.
 
         A leg that is forbidden may have been the only path to a state.
         """
-        return all(np.isfinite(self._home[v]) for v in tour)
+        return all(np.isfinite(self._home_lengths[v]) for v in tour)
 
     @property
     def _reached_states(self) -> list[int]:
         """Return the states that the robot gets to."""
-        return [v for v, length in enumerate(self._home) if np.isfinite(length)]
+        return [v for v, length in enumerate(self._home_lengths) if np.isfinite(length)]
 
     def solve(
         self, clock: Clock, warm_start: Sequence[int] | None = None, **options: Any
@@ -264,14 +273,14 @@ class StateGraph:
         """
         usable = self._reached_states
         vertex = {v: k for k, v in enumerate(usable, 1)}
-        lengths = np.array([self._home[v] for v in usable])
+        lengths = np.array([self._home_lengths[v] for v in usable])
         costs = np.zeros((len(usable) + 1, len(usable) + 1))
         costs[1:, 1:] = lengths[:, None] + lengths[None, :]
         costs[0, 1:] = costs[1:, 0] = lengths
         for (v, w), path in self.legs.items():
             if v in vertex and w in vertex:
                 costs[vertex[v], vertex[w]] = costs[vertex[w], vertex[v]] = polylines.length(path)
-        for v, w in self._cut:
+        for v, w in self._forbidden_via_start:
             a, b = vertex.get(v, 0), vertex.get(w, 0)
             costs[a, b] = costs[b, a] = np.inf
         places, begin = self.states.places, self.states.present
@@ -309,12 +318,12 @@ class StateGraph:
         # if the time ran out, only the first state of each waypoint has a path out
         for v, state in enumerate(self.states.entries):
             if (
-                self._out[v] is None
+                self._paths_out[v] is None
                 and self.states.places.waypoint[state.place] not in self.reached_waypoints
             ):
-                self._out[v] = self._path_along_tether(v)
+                self._paths_out[v] = self._path_along_tether(v)
         self._measure_paths_home(self.legs)
-        for v in sorted(self._reached_states, key=lambda v: self._home[v]):
+        for v in sorted(self._reached_states, key=lambda v: self._home_lengths[v]):
             waypoint = int(self.states.places.waypoint[self.states.entries[v].place])
             if v == self.states.present or waypoint in state_of:
                 continue
@@ -322,9 +331,9 @@ class StateGraph:
                 state_of[waypoint] = v
         if not state_of:
             return None
-        without_legs = replace(self, legs={}, _one_way={})
+        without_legs = replace(self, legs={}, _is_one_way={})
         # a path out through other states follows the legs of this board
-        without_legs._out = [self.path_out(v) for v in range(len(self._out))]
+        without_legs._paths_out = [self.path_out(v) for v in range(len(self._paths_out))]
         driven = without_legs._drive([state_of[n] for n in sorted(state_of)])
         return driven if driven.fault is None else None
 
@@ -353,7 +362,8 @@ class StateGraph:
     def _count_reversed_legs(self, tour: Sequence[int]) -> int:
         """Return how many legs of a tour arrive only in the other direction."""
         return sum(
-            self._one_way.get((min(v, w), max(v, w)), v < w) != (v < w) for v, w in pairwise(tour)
+            self._is_one_way.get((min(v, w), max(v, w)), v < w) != (v < w)
+            for v, w in pairwise(tour)
         )
 
     def _drive(self, tour: Sequence[int]) -> DrivenTour:

@@ -89,7 +89,7 @@ class Detours:
 
     board: StateGraph
     paths: RobotPaths
-    _paths: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
+    _paths_by_ends: dict[tuple[int, int], list[tuple[Floats, int]]] = field(default_factory=dict)
 
     @property
     def _policy(self) -> DetourPolicy:
@@ -178,13 +178,13 @@ class Detours:
 
     def _paths_between(self, n: int, m: int) -> list[tuple[Floats, int]]:
         """Return the paths from a place to another and their words, shortest first."""
-        if (n, m) in self._paths:
-            return self._paths[n, m]
+        if (n, m) in self._paths_by_ends:
+            return self._paths_by_ends[n, m]
         if m == HOME or (n != HOME and n > m):
             number = self.paths.context.word_number
             reverse = [(path[::-1], number(path[::-1])) for path, _ in self._paths_between(m, n)]
-            self._paths[n, m] = [(path, word) for path, word in reverse if word is not None]
-            return self._paths[n, m]
+            self._paths_by_ends[n, m] = [(path, word) for path, word in reverse if word is not None]
+            return self._paths_by_ends[n, m]
         context, mission = self.paths.context, self.paths.context.mission
         begin, end = self._place(n), self._place(m)
         paths = self._taut_paths(n, m)
@@ -196,8 +196,8 @@ class Detours:
         numbered = [
             (path, context.word_number(path)) for path in sorted(paths, key=polylines.length)
         ]
-        self._paths[n, m] = [(path, word) for path, word in numbered if word is not None]
-        return self._paths[n, m]
+        self._paths_by_ends[n, m] = [(path, word) for path, word in numbered if word is not None]
+        return self._paths_by_ends[n, m]
 
     def _taut_paths(self, n: int, m: int) -> list[Floats]:
         """Return the paths between two places without detours."""
