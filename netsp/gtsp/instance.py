@@ -206,8 +206,8 @@ class Instance:
         return out
 
     def estimate(self, k: int) -> Estimate:
-        """Return the estimate for the costs of all legs among k vertices; nothing once all legs
-        have been measured."""
+        """Return the estimate for the costs of all legs among k vertices; zero once all legs have
+        been measured."""
         return self.oracle.estimate(k) if self._costs is None else Estimate(0.0, 0.0)
 
     @renamed_parameters(asked="wanted")
@@ -336,11 +336,11 @@ class Instance:
 
         `LimitReachedError` may be raised in the body.
         """
-        before, self.clock = self.clock, clock
+        outer_clock, self.clock = self.clock, clock
         try:
             yield
         finally:
-            self.clock = before
+            self.clock = outer_clock
 
     def _measured(self, vertices: Ints, wanted: Bools | None = None) -> Floats:
         with self._timed():

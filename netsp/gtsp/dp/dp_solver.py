@@ -110,7 +110,7 @@ def walk_steps(
     direction: Floats = np.zeros(walks.n + 1)
     best_bound, best_prices, step, vain_passes = -np.inf, prices, policy.first_step, 0
     history: list[tuple[float, int]] = []
-    searched = run.searches_all_vertices(costs)
+    has_searched_all = run.searches_all_vertices(costs)
     while not run.is_done:
         yield
         run.check()
@@ -132,10 +132,10 @@ def walk_steps(
             costs.measure(np.concatenate([[0], walk.rows]))
             run.update_incumbent([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
-        _forget(run, walks, costs)
-        if not searched and run.searches_all_vertices(costs):
+        _remove_dead_vertices(run, walks, costs)
+        if not has_searched_all and run.searches_all_vertices(costs):
             run.search(costs)
-            searched = True
+            has_searched_all = True
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if is_tour:
             if was_measured and not run.is_done:
@@ -149,13 +149,15 @@ def walk_steps(
             if vain_passes % policy.patience == 0:
                 step, prices = step * policy.step_decay, best_prices
         history.append((best_bound, int(walks.alive.sum())))
-        stalls = _stalls(history, run.length, policy)
-        if costs.exact is not None and (stalls or len(costs) <= costs.policy.max_measured_vertices):
+        has_stalled = _stalls(history, run.length, policy)
+        if costs.exact is not None and (
+            has_stalled or len(costs) <= costs.policy.max_measured_vertices
+        ):
             _measure(run, walks, costs)
-            searched = run.searches_all_vertices(costs)
+            has_searched_all = run.searches_all_vertices(costs)
             best_bound, step = -np.inf, policy.first_step
             history.clear()
-        elif stalls:
+        elif has_stalled:
             return
         if costs.exact is None and handover.is_due(len(costs), walk.labels):
             return
@@ -187,7 +189,7 @@ def initial_prices(run: SearchingRun, costs: CostMatrix) -> Floats:
     return prices
 
 
-def _forget(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
+def _remove_dead_vertices(run: SearchingRun, walks: Walks, costs: CostMatrix) -> None:
     """Remove vertices without a state once they are many, except those of the incumbent."""
     keep = walks.left
     if run.tour is not None:
