@@ -496,14 +496,14 @@ def test_legs_that_an_lp_uses_are_measured_and_no_others(monkeypatch):
 
 def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
     seen = []
-    few = root.Root._few_per_vertex
+    few = root.Root._cheapest_per_vertex
 
     def note(self, legs, price):
         if self.costs.exact is not None and len(legs):
             seen.append(bool(self.costs.exact[legs[:, 0], legs[:, 1]].all()))
         return few(self, legs, price)
 
-    monkeypatch.setattr(root.Root, "_few_per_vertex", note)
+    monkeypatch.setattr(root.Root, "_cheapest_per_vertex", note)
     bound_legs_first(monkeypatch)
     assert solve(travel_graph(far_world(0, goals=5, tether_length=500.0))).status is Status.OPTIMAL
     assert seen

@@ -220,8 +220,8 @@ class _Level:
     def used_legs(self) -> tuple[Ints, Floats]:
         """Return the legs (k, 2) that the point uses, and their values (k,)."""
         point = self.root.point or self.root._solve_lp()
-        on = point.y > 1e-6
-        return self.root.costs.vertices[point.legs[on]], point.y[on]
+        is_used = point.y > 1e-6
+        return self.root.costs.vertices[point.legs[is_used]], point.y[is_used]
 
     def visited_cells(self) -> Ints:
         """Return the cells that the point visits; none if there is no point."""

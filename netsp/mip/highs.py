@@ -103,14 +103,14 @@ class HighsRelaxation:
         h, gone = self._highs, self._column[~keep]
         h.changeColsBounds(len(gone), gone, np.zeros(len(gone)), np.zeros(len(gone)))
         self.legs, self._column = self.legs[keep], self._column[keep]
-        out = np.ones(h.getNumCol(), dtype=bool)
-        out[self._column] = False
+        is_deleted = np.ones(h.getNumCol(), dtype=bool)
+        is_deleted[self._column] = False
         basis = h.getBasis()
         if basis.valid:
-            out &= ~_basic(basis.col_status)
-        at = np.flatnonzero(out).astype(np.int32)
-        h.deleteCols(len(at), at)
-        self._column -= np.searchsorted(at, self._column).astype(np.int32)
+            is_deleted &= ~_basic(basis.col_status)
+        deleted = np.flatnonzero(is_deleted).astype(np.int32)
+        h.deleteCols(len(deleted), deleted)
+        self._column -= np.searchsorted(deleted, self._column).astype(np.int32)
 
     def restrict(self, keep: Bools) -> None:
         """Renumber legs and cuts for the vertices of a mask, which hold the ends of all legs."""

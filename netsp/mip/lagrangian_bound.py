@@ -2,13 +2,13 @@
 
 For any λ, π free and μ <= 0 the Lagrangian gives, for every tour,
 
-    length >= Σ_C λ_C + Σ_k μ_k room_k + Σ over its vertices of r_v + Σ over its legs of r_uv,
+    length >= Σ_C λ_C + Σ_k μ_k rhs_k + Σ over its vertices of r_v + Σ over its legs of r_uv,
 
 with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k or uv in a tooth of k] and
 r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k]. A tour takes one vertex of each cluster, and there
 two legs (m >= 2), each of which has two ends; so
 
-    length >= Σ_k μ_k room_k + Σ_C (λ_C + min over v in C of (r_v + half of its two lowest r_uv)).
+    length >= Σ_k μ_k rhs_k + Σ_C (λ_C + min over v in C of (r_v + half of its two lowest r_uv)).
 
 It holds whatever the solver's tolerances were. At an LP optimum no r_uv is negative, and the bound
 is at least the optimum. Before, while many legs of negative r_uv are not in the LP yet, it is far
@@ -84,5 +84,5 @@ def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> 
         r += sum(mu for c, mu in active if c.inside[v] and c.cluster != cluster[v])
         vertex.append(r + sum(sorted(legs[v])[:2]) / 2)
     lowest = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
-    rooms = sum((mu * Fraction(c.rhs) for c, mu in active), Fraction(0))
-    return Fraction(sum(cluster_dual) + sum(lowest) + rooms)
+    constant = sum((mu * Fraction(c.rhs) for c, mu in active), Fraction(0))
+    return Fraction(sum(cluster_dual) + sum(lowest) + constant)

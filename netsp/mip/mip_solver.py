@@ -322,7 +322,7 @@ class MipRun(SearchingRun):
     def cut_steps(self, costs: CostMatrix, backend: str, warm: WarmStart | None) -> Steps[None]:
         """Do what `cut` does, with a step for each LP of the root and each node of the tree."""
         policy = self.mip_policy
-        self._gap_searched = self.length
+        self._gap_at_last_search = self.length
         if warm is not None:
             # a core is proven over lengths; over estimates its cuts would prove less
             costs.measure(np.searchsorted(costs.vertices, warm.measured))
@@ -408,8 +408,8 @@ class MipRun(SearchingRun):
             self.offer_rounded(root.costs, point, is_whole=is_whole)
             return
         gap = self.length - (self.bound or 0.0)
-        if gap < self.mip_policy.search_gap_ratio * self._gap_searched:
-            self._gap_searched = gap
+        if gap < self.mip_policy.search_gap_ratio * self._gap_at_last_search:
+            self._gap_at_last_search = gap
             self.search(root.costs, np.flatnonzero(point.x > INTEGRALITY_TOLERANCE))
 
     def offer_rounded(self, costs: CostMatrix, point: Point, *, is_whole: bool) -> None:

@@ -74,8 +74,8 @@ def parity_cuts(
     check
         Called for each set of barriers; may raise to stop.
     """
-    on = y > FLOW_TOLERANCE
-    u, v = legs[on].T
+    is_used = y > FLOW_TOLERANCE
+    u, v = legs[is_used].T
     clusters = int(cluster.max()) + 1
     pairs, pair = _pairs_of(np.column_stack([cluster[u], cluster[v]]), clusters)
     row = np.searchsorted(np.sort(pairs.ravel()), np.arange(clusters + 1)).astype(np.int64)
@@ -88,7 +88,7 @@ def parity_cuts(
         for barriers in combinations(range(odd.shape[1]), size):
             check()
             side_of = _sides(odd, barriers)
-            flow = _flow(pair, side_of[u] ^ side_of[v], y[on], len(pairs))
+            flow = _flow(pair, side_of[u] ^ side_of[v], y[is_used], len(pairs))
             if not flow[:, 1].any():
                 continue
             for sides in (np.zeros(clusters, dtype=np.bool_), _along_tree(pairs, flow, clusters)):

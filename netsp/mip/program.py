@@ -9,7 +9,7 @@ y_uv (leg u-v is travelled; legs are undirected, so one variable serves both dir
 
 McCammon & Hollinger 2017 write (3) as a product y·x summed over a goal; the linear form per vertex
 says the same and also ties the class of the incoming leg to that of the outgoing one. Their (4) is
-a printer's subtour cut (its left side lacks the restriction to S); ours is the generalised subtour
+a misprinted subtour cut (its left side lacks the restriction to S); ours is the generalised subtour
 elimination constraint y(δ(S)) >= 2 x(S ∩ C), rewritten with (3): if the vertex that serves C lies
 in S, the tour must enter and leave S. (Fischetti, Salazar & Toth 1995, here aggregated over S ∩ C.)
 It is strongest where S holds all of C: then x(S \\ C) is the same, and no y(E(S)) is smaller.

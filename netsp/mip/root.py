@@ -349,13 +349,13 @@ class Root:
     def _drop_expensive_legs(self, price: Floats, point: Point) -> None:
         """Remove legs of large reduced cost from the LP; pricing brings them back if needed."""
         policy = self.policy.lp
-        is_dear = price > policy.max_reduced_cost * self.run.length
-        old = len(point.y)
-        is_dear[old:] = False
-        is_dear[:old] &= point.y <= ROUNDING_TOLERANCE
-        is_dear &= ~np.isin(self._keys(self.lp.legs), self._keys(tour_legs(self.tour())))
-        if is_dear.sum() > policy.max_dead_share * len(is_dear):
-            self.lp.keep_legs(~is_dear)
+        is_expensive = price > policy.max_reduced_cost * self.run.length
+        old_count = len(point.y)
+        is_expensive[old_count:] = False
+        is_expensive[:old_count] &= point.y <= ROUNDING_TOLERANCE
+        is_expensive &= ~np.isin(self._keys(self.lp.legs), self._keys(tour_legs(self.tour())))
+        if is_expensive.sum() > policy.max_dead_share * len(is_expensive):
+            self.lp.keep_legs(~is_expensive)
 
     def _columns_to_add(self, prices: Prices, tolerance: float) -> tuple[Ints, bool]:
         """Return the legs to add, a few of each vertex, and whether any was longer than estimated.
@@ -371,12 +371,12 @@ class Root:
             if self.costs.measures_single_legs and self.costs.measure_legs(legs):
                 longer, price = True, prices.reduced_costs(legs)
             negative = price < -tolerance
-            new = self._few_per_vertex(legs[negative], price[negative])
+            new = self._cheapest_per_vertex(legs[negative], price[negative])
             if len(new) or not len(legs):
                 break
         return new, longer
 
-    def _few_per_vertex(self, legs: Ints, price: Floats) -> Ints:
+    def _cheapest_per_vertex(self, legs: Ints, price: Floats) -> Ints:
         """Return the cheapest of legs (k, 2) by their prices (k,), a few of each vertex."""
         policy = self.policy.pricing
         limit = policy.max_new_legs_per_vertex

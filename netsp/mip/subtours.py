@@ -29,9 +29,9 @@ def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    on = y > SUPPORT_TOLERANCE
+    is_used = y > SUPPORT_TOLERANCE
     n = len(x)
-    u, v = legs[on].T
+    u, v = legs[is_used].T
     graph = coo_array((np.ones(len(u)), (u, v)), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     label = np.where(x > SUPPORT_TOLERANCE, label, -1)
@@ -147,8 +147,8 @@ def fractional_cuts(
         cuts += goal_cuts(legs, y, cluster, policy)
     known = {np.packbits(c.inside).tobytes() for c in cuts}
     support = np.flatnonzero(x > SUPPORT_TOLERANCE)
-    on = y > SUPPORT_TOLERANCE
-    sets = _SetCuts(x, legs[on], y[on], cluster, policy)
+    is_used = y > SUPPORT_TOLERANCE
+    sets = _SetCuts(x, legs[is_used], y[is_used], cluster, policy)
     if branch is not None and len(branch) and "branches" in policy.families:
         sets.add_branches(branch, support)
     if "minimum cuts" in policy.families and len(sets.found) < policy.max_subtour_cuts // 2:
@@ -213,9 +213,9 @@ class _SetCuts:
 
 def cycles_of(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
     """Return the cycles of an integer point as lists of vertices, the base's cycle first."""
-    on = legs[y > 0.5]
+    used_legs = legs[y > 0.5]
     neighbours: dict[int, list[int]] = {}
-    for u, v in on.tolist():
+    for u, v in used_legs.tolist():
         neighbours.setdefault(u, []).append(v)
         neighbours.setdefault(v, []).append(u)
     cycles = []
