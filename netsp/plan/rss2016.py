@@ -329,15 +329,15 @@ def anneal(
             a, b, s = order[leg], order[leg + 1], via[leg]
             o = below(obstacles, chance)
             if s < 0:
-                turned = far[a, b, o]
+                new_via = far[a, b, o]
             elif near[a, s, o] <= near[b, s, o]:
-                turned = far[a, s, o]
+                new_via = far[a, s, o]
             else:
-                turned = far[b, s, o]
-            if turned < 0 or not (planar[a, turned] + planar[b, turned] < np.inf):
+                new_via = far[b, s, o]
+            if new_via < 0 or not (planar[a, new_via] + planar[b, new_via] < np.inf):
                 continue
             kept[0] = s
-            via[leg] = turned
+            via[leg] = new_via
         else:
             continue
         new_length, new_entangled, new_missed = evaluate(now, table)
