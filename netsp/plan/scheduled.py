@@ -149,7 +149,7 @@ class Portfolio:
 
     def _estimate_of_walks(self) -> Estimate:
         graph, legs = self.graph, self.graph.estimate(len(self.graph))
-        seconds = self.times.s_per_label * graph.goal_count**3 * len(graph)
+        seconds = self.times.s_per_label * graph.goal_count**4 * len(graph)
         return Estimate(legs.seconds + seconds, 2.0 * legs.bytes)
 
     def _estimate_of_cuts(self, count: int) -> Estimate:
@@ -241,6 +241,9 @@ class Portfolio:
         yield
         yield from walk_steps(run, costs, self.policy.mip.handover)
         self.costs = costs
+        for task in self.tasks:
+            if task.name == "cuts":
+                task.estimate = self._estimate_of_cuts(len(costs))
 
     def _core(self) -> Steps[None]:
         """Prove over a core of the classes; twice the tether of any other bounds its tours."""

@@ -176,7 +176,8 @@ class TaskTimePolicy:
     s_per_covered_pair
         Time of covers for each pair of goals, s.
     s_per_label
-        Time of walks for each triple of goals and each vertex, s.
+        Time of walks for each vertex, divided by the fourth power of the number of goals, s: labels
+        remember sets of goals, so their number grows faster than that of pairs.
     s_per_priced_leg
         Time of cutting planes for each pair of vertices, s.
     s_per_cut_pair
@@ -187,8 +188,8 @@ class TaskTimePolicy:
 
     s_per_round: float = 3e-4
     s_per_goal_pair: float = 1e-4
-    s_per_covered_pair: float = 2e-3
-    s_per_label: float = 2.5e-7
+    s_per_covered_pair: float = 5e-3
+    s_per_label: float = 2.5e-9
     s_per_priced_leg: float = 5e-6
     s_per_cut_pair: float = 5e-4
     min_core_ratio: float = 2.0
