@@ -141,10 +141,10 @@ def show_execution(
         total = total_s(row)
         if count[0] % 20 == 1:
             name = "base" if row.goal < 0 else problem.goal_label(row.goal)
-            of = "" if total is None else f" of about {total:.0f}"
+            of_total = "" if total is None else f" of about {total:.0f}"
             print(
-                f"\r{row.time:8.1f}{of} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
-                f"{problem.units}   ",
+                f"\r{row.time:8.1f}{of_total} s  to {name:<9} tether {row.tether:8.2f} of "
+                f"{row.limit:g} {problem.units}   ",
                 end="",
                 file=sys.stderr,
                 flush=True,

@@ -8,6 +8,7 @@ import sys
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.base.deprecated import deprecated_method
 from netsp.base.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.command import messages
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"the page is {page.address}", file=sys.stderr)
 
         def on_report(report: Report) -> None:
-            counts.take(report)
+            counts.add(report)
             row = report.as_row() if lines is not None or page is not None else None
             if lines is not None:
                 lines.write(json.dumps(row, allow_nan=False) + "\n")
@@ -114,7 +115,9 @@ class ReportCounts:
     def _clear(self) -> str:
         return "\r\033[K" if self._is_shown else ""
 
-    def take(self, report: Report) -> None:
+    take = deprecated_method("take", "add")
+
+    def add(self, report: Report) -> None:
         """Add a report."""
         self._count += 1
         for alarm in report.raised:

@@ -91,13 +91,13 @@ class ProgressTable:
             self._print(_HEADER)
             self._header = True
         tour = "-" if row.incumbent is None else f"{row.incumbent:.6g}"
-        bound = gap = of = "-"
+        bound = gap = scope = "-"
         if row.bound is not None and row.bound.length > 0.0:  # no tour is shorter than 0 anyway
-            bound, of = f"{row.bound.length:.6g}", row.bound.scope.column
+            bound, scope = f"{row.bound.length:.6g}", row.bound.scope.column
             if row.incumbent is not None:
                 gap = row.bound.percent(row.incumbent, 3)
         self._print(
-            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>9} {of:>11} "
+            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>9} {scope:>11} "
             f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
             f"{row.iteration:>11}"
         )

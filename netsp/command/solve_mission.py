@@ -199,7 +199,7 @@ def _gap_hint(found: SolvedMission) -> str:
 
 
 def _gap_lines(found: SolvedMission, units: str) -> list[str]:
-    """Return lines about the gaps that a finer cell shows, and those that stay hidden."""
+    """Return lines about gaps that a finer cell shows, and about gaps that stay hidden."""
     if found.gaps is None:
         return []
     cell = f"{found.gaps.cell:.3g} {units}"

@@ -97,8 +97,7 @@ def _compile(all_steps: list[Step], quiet: bool) -> None:
 
 
 def _compile_likely(command: str) -> None:
-    """Run all steps, first those that a user of the command likely needs next, until the disk is
-    full."""
+    """Run all steps in the order of `_likely_first`, until the disk is full."""
     from netsp.base.compiled.tiered import TieredDispatcher
 
     for _, step in _likely_first(list(steps()), command):
@@ -107,7 +106,7 @@ def _compile_likely(command: str) -> None:
 
 
 def _likely_first(all_steps: list[Step], command: str) -> list[Step]:
-    """Return all steps, first those that a user of the command likely needs next."""
+    """Return all steps, beginning with the likely needs of a user of the command."""
     words = STEP_WORDS.get(command, "solver")
     return sorted(all_steps, key=lambda step: words not in step[0])
 

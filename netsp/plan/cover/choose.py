@@ -69,7 +69,7 @@ def choose(
 
 
 def merge_patches(sees: Bools, areas: Floats) -> tuple[Bools, Floats]:
-    """Merge the patches that the same viewpoints see, and drop those that no viewpoint sees.
+    """Merge patches that the same viewpoints see, and drop patches that no viewpoint sees.
 
     Returns
     -------

@@ -104,7 +104,7 @@ class StateGraph:
     # state before on that path, for states without a path along their tether
     _via_state: dict[int, int] = field(default_factory=dict)
     # legs that arrive in one direction only: whether that is from the lower number to the higher
-    _is_one_way: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _directions: dict[tuple[int, int], bool] = field(default_factory=dict)
     # pairs of states whose leg is forbidden, and those whose path through the start is, too
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
     _forbidden_via_start: set[tuple[int, int]] = field(default_factory=set)
@@ -134,13 +134,13 @@ class StateGraph:
                 [self.context.start_tether.nodes[::-1], self.context.present_tether.nodes[1:]]
             )
         legs_by_pair = dict[tuple[int, int], Floats]()
-        self._is_one_way = {}
-        for v, w, path, is_two_way in legs.both_directions():
+        self._directions = {}
+        for v, w, path, has_reverse in legs.both_directions():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
                 legs_by_pair[pair] = path if v < w else path[::-1]
-                if not is_two_way:
-                    self._is_one_way[pair] = v < w
+                if not has_reverse:
+                    self._directions[pair] = v < w
         self._measure_paths_home(legs_by_pair)
         self.legs = {
             (v, w): path
@@ -163,7 +163,7 @@ class StateGraph:
         has no room there, through other states."""
         legs_from: dict[int, list[tuple[int, float]]] = {}
         for (v, w), path in legs.items():
-            if (v, w) in self._is_one_way:
+            if (v, w) in self._directions:
                 continue
             length = polylines.length(path)
             legs_from.setdefault(v, []).append((w, length))
@@ -331,7 +331,7 @@ class StateGraph:
                 state_of[waypoint] = v
         if not state_of:
             return None
-        without_legs = replace(self, legs={}, _is_one_way={})
+        without_legs = replace(self, legs={}, _directions={})
         # a path out through other states follows the legs of this board
         without_legs._paths_out = [self.path_out(v) for v in range(len(self._paths_out))]
         driven = without_legs._drive([state_of[n] for n in sorted(state_of)])
@@ -362,7 +362,7 @@ class StateGraph:
     def _count_reversed_legs(self, tour: Sequence[int]) -> int:
         """Return how many legs of a tour arrive only in the other direction."""
         return sum(
-            self._is_one_way.get((min(v, w), max(v, w)), v < w) != (v < w)
+            self._directions.get((min(v, w), max(v, w)), v < w) != (v < w)
             for v, w in pairwise(tour)
         )
 
