@@ -1,4 +1,4 @@
-"""What each mechanism of `auto` brings: solves with one left out, beside solves with all.
+"""Effect of each mechanism of `auto`: solves without the mechanism, beside solves with all.
 
     python benchmarks/ablation.py                          the library and cells of the frontier
     python benchmarks/ablation.py --without combs parity   some mechanisms
@@ -99,7 +99,7 @@ class Outcome:
 
     @property
     def proven(self) -> bool:
-        """Whether no tour is shorter."""
+        """True if the gap is closed to the tolerance of a proof."""
         return self.gap <= 1e-6
 
 

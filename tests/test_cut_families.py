@@ -43,3 +43,9 @@ def test_a_family_left_out_is_not_separated(graph, monkeypatch):
 def test_an_unknown_family_is_refused():
     with pytest.raises(InputError, match="families: unknown 'clique'; expected some of goals"):
         CutPolicy(families=("clique",))
+    with pytest.raises(InputError, match="families: unknown 'clique'; expected some of goals"):
+        CutPolicy(families="clique")
+
+
+def test_a_lone_name_is_one_family():
+    assert CutPolicy(families="combs").families == ("combs",)

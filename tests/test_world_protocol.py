@@ -1,4 +1,4 @@
-"""The same posts as a problem in the plane and as a mission in space, asked alike."""
+"""Both worlds answer alike about the same posts, in the plane and in space."""
 
 import numpy as np
 import pytest

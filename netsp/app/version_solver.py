@@ -49,8 +49,8 @@ class VersionSolver:
     def solve(self, time_limit: float, before: Solution | None) -> Solution | None:
         """Solve the version, and return its solution; None without one or if stopped.
 
-        The work starts from what is left of the tour before (`netsp.plan.warm_start`), which an
-        edit rarely changes much.
+        The search starts from the previous tour, adapted to the edit (`netsp.plan.warm_start`),
+        because an edit rarely changes much.
         """
         clock = Clock(time_limit, should_stop=self._connection.poll)
         try:

@@ -517,7 +517,7 @@ class Instance:
         Returns
         -------
         LowerBound or None
-            Bound that includes what was left out, as far as that can be bounded.
+            Bound that also holds for tours through vertices left out, if these can be bounded.
         """
         scope = self.scope if bound is None else bound.scope
         bound, whole = self._with_left_out(bound, scope)

@@ -82,8 +82,9 @@ class CutPolicy:
     def __post_init__(self) -> None:
         check_not_negative(self)
         check_shares(self, "incumbent_weight", "max_kept_share")
-        # lists, as study files have them
-        object.__setattr__(self, "families", tuple(self.families))
+        # lists, as study files have them, or one name, as the command line has it
+        families = (self.families,) if isinstance(self.families, str) else tuple(self.families)
+        object.__setattr__(self, "families", families)
         for family in self.families:
             if family not in CUT_FAMILIES:
                 known = ", ".join(CUT_FAMILIES)

@@ -142,7 +142,7 @@ def crashed(error: BaseException) -> TrialRow:
 
 
 def _limit_memory(gib: float) -> None:
-    """Limit the process to so many GiB beyond the memory that it uses now."""
+    """Limit the memory of the process to its present use and a number of GiB more."""
     import resource
 
     with open("/proc/self/statm") as file:
