@@ -4,12 +4,10 @@ Every source is a task: its steps (`netsp.gtsp.resumable`), and an estimate of t
 that it takes. The scheduler gives the next slice of CPU time to the task that promises most, and
 measures what the slice has closed of the gap between the incumbent and the bound.
 
-The promise of a task is a length per second. A task that has closed nothing yet promises the whole
-gap in the time of its estimate; once it has had more, the promise falls with the square of the
-time. So tasks of little work come first, and a large task is not judged while it prepares. After
-its first success the promise is what the last slices have closed per second. A task that no longer
-closes anything is not forgotten: it promises a share (`SchedulerPolicy.hope`) of the gap in as much
-time as it has had.
+The promise of a task is a length per second: what its last slices have closed per second, or what
+its estimate says if that is more. By the estimate a task closes the whole gap in its time; once it
+has had more, this promise falls with the square of the time. So tasks of little work come first, a
+large task is not judged while it prepares, and none that closes nothing is ever forgotten.
 
 Under a limit of iterations a step counts as a fixed time, so that a seed always gives the same
 result.
@@ -41,9 +39,6 @@ class SchedulerPolicy:
         Length of a later slice, as a share of the time that the task has had.
     discount
         Weight of a slice in the rate of a task, relative to the slice after it.
-    hope
-        Share of the gap that a task without success is expected to close in as much time as it has
-        had. With more, time is shared more equally.
     memory_share
         Maximum share of the available memory for a task.
     min_slice_s
@@ -54,15 +49,14 @@ class SchedulerPolicy:
 
     probe_s: float = 0.05
     growth: float = 0.2
-    discount: float = 0.5
-    hope: float = 0.1
+    discount: float = 0.8
     memory_share: float = 0.8
     min_slice_s: float = 1e-4
     step_s: float = 0.01
 
     def __post_init__(self) -> None:
         check_positive(self)
-        check_shares(self, "discount", "hope", "memory_share")
+        check_shares(self, "discount", "memory_share")
 
 
 class Task:
@@ -95,7 +89,6 @@ class Task:
         self._make_steps = make_steps
         self._steps: Steps[None] | None = None
         self._recent_s, self._recent_closed = 0.0, 0.0
-        self._has_succeeded = False
 
     def advance(self) -> None:
         """Make one step."""
@@ -109,7 +102,6 @@ class Task:
     def note(self, seconds: float, before: float, gap: float, discount: float) -> None:
         """Account for a slice of some seconds, with the gap before it and after it."""
         closed = max(before - gap, 0.0) if before < math.inf else 0.0
-        self._has_succeeded |= gap < before
         self.spent += seconds
         self.closed += closed
         self._recent_s = discount * self._recent_s + seconds
@@ -117,10 +109,9 @@ class Task:
 
     def promise(self, gap: float, policy: SchedulerPolicy) -> float:
         """Return the length per second by which the task is expected to narrow the gap."""
-        if not self._has_succeeded:
-            expected = max(self.estimate.seconds, policy.probe_s)
-            return gap * expected / max(expected, self.spent) ** 2
-        return max(self._recent_closed / self._recent_s, policy.hope * gap / self.spent)
+        expected = max(self.estimate.seconds, policy.probe_s)
+        planned = gap * expected / max(expected, self.spent) ** 2
+        return max(planned, self._recent_closed / self._recent_s if self._recent_s else 0.0)
 
     def close(self) -> None:
         """End the steps, so that arrays are free."""

@@ -1,6 +1,6 @@
 """`auto` by a scheduler: every source of a bound or a tour is a task, and none is chosen by size.
 
-The tasks are dynamic programming over sets of goals, a search that never ends, the bound over
+The tasks are a search, one that never ends, dynamic programming over sets of goals, the bound over
 goals, covers, ng-walks, cutting planes over a core of the classes, and cutting planes with branch
 and cut over all classes. They share one incumbent and one bound. Which of them runs next is decided
 by what they have closed of the gap (`netsp.gtsp.scheduler`); estimates of their time take the place
@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from netsp.base.arrays import Ints
 from netsp.base.clock import Clock
 from netsp.gtsp.cost_matrix import CostMatrix
 from netsp.gtsp.cost_oracle import Estimate
@@ -36,6 +37,9 @@ from netsp.model.bound_scope import LowerBound
 from netsp.model.solution import Status
 from netsp.plan import exact
 from netsp.plan.solve_policy import SolvePolicy
+
+NO_VERTICES: Ints = np.zeros(0, dtype=np.int64)
+"""Empty selection of vertices."""
 
 
 def solve(graph: Instance, backend: str, policy: SolvePolicy, limits: Limits) -> Result:
@@ -107,6 +111,7 @@ class Portfolio:
         self.costs: CostMatrix | None = None
         self.core: ScheduledRun | None = None
         self.goal_bound: GoalBound | None = None
+        self.has_searched_all = False
         self.tasks = self._tasks()
 
     def steps(self) -> Steps[None]:
@@ -115,17 +120,25 @@ class Portfolio:
         scheduler = Scheduler(run, self.tasks, run.gap, self.policy.scheduler)
         for _ in scheduler.steps():
             yield
-            if all(t.is_over for t in self.tasks if t.name != "search") and run.clock.limit is None:
+            if (
+                all(t.is_over for t in self.tasks if t.name != "search on")
+                and run.clock.limit is None
+            ):
                 return
 
     def _tasks(self) -> list[Task]:
         graph, policy = self.graph, self.policy
-        tasks = [Task("search", self._search, self._estimate_of_search())]
+        search = self._estimate_of_search()
+        again = self.policy.mip.merging.searches * search.seconds
+        tasks = [
+            Task("search", self._search, search),
+            Task("search on", self._search_on, Estimate(again, search.bytes)),
+        ]
         if exact.fits(graph, policy.subsets):
             tasks.append(Task("subsets", self._subsets, exact.estimate(graph, policy.subsets)))
         if len(graph.before):
             if walks_fit(graph, policy.gtsp.walks):
-                tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
+                tasks.append(Task("walks", self._walks, self._estimate_of_walks(len(graph))))
             tasks.append(Task("free", self._without_order, self._estimate_of_cuts(len(graph))))
             return tasks
         pairs = (graph.goal_count + 1) ** 2
@@ -133,23 +146,29 @@ class Portfolio:
         if graph.parity_oracle is not None:
             tasks.append(Task("covers", self._covers, self._estimate_of_covers()))
         if walks_fit(graph, policy.gtsp.walks):
-            tasks.append(Task("walks", self._walks, self._estimate_of_walks()))
+            tasks.append(Task("walks", self._walks, self._estimate_of_walks(len(graph))))
         if not graph.has_cost_matrix:
             core = self.run.core_classes_per_goal * graph.goal_count
             if self.times.min_core_ratio * core < len(graph):
-                tasks.append(Task("core", self._core, self._estimate_of_cuts(core)))
+                tasks.append(Task("core", self._core, self._estimate_of_core(core)))
         tasks.append(Task("cuts", self._cuts, self._estimate_of_cuts(len(graph))))
         return tasks
+
+    def _searches_all(self) -> bool:
+        """Return whether the first search sees all vertices, with costs that the cuts need, too."""
+        run = self.run
+        is_small = len(self.graph) <= run.gtsp_policy.proof_search.max_whole_search
+        return (is_small or self.graph.has_cost_matrix) and not run.uses_sparse_costs
 
     def _estimate_of_search(self) -> Estimate:
         run = self.run
         count = min(len(run.graph), run.searched_classes_per_goal * run.graph.goal_count)
-        seconds = self.times.s_per_round * run.search_rounds
-        return Estimate(seconds, run.graph.estimate(count).bytes)
+        legs = run.graph.estimate(count)
+        return Estimate(legs.seconds + self.times.s_per_round * run.search_rounds, legs.bytes)
 
-    def _estimate_of_walks(self) -> Estimate:
-        graph, legs = self.graph, self.graph.estimate(len(self.graph))
-        seconds = self.times.s_per_label * graph.goal_count**4 * len(graph)
+    def _estimate_of_walks(self, count: int) -> Estimate:
+        legs = self.graph.estimate(count)
+        seconds = self.times.s_per_label * self.graph.goal_count**5 * count
         return Estimate(legs.seconds + seconds, 2.0 * legs.bytes)
 
     def _estimate_of_cuts(self, count: int) -> Estimate:
@@ -157,6 +176,10 @@ class Portfolio:
         seconds = self.times.s_per_priced_leg * count**2
         seconds += self.times.s_per_cut_pair * self.graph.goal_count**2
         return Estimate(legs.seconds + seconds, 2.0 * legs.bytes)
+
+    def _estimate_of_core(self, count: int) -> Estimate:
+        estimates = self._estimate_of_cuts(count), self._estimate_of_walks(count)
+        return min(estimates, key=lambda estimate: estimate.seconds)
 
     def _estimate_of_covers(self) -> Estimate:
         pairs = (self.graph.goal_count + 1) ** 2
@@ -167,25 +190,30 @@ class Portfolio:
         yield
 
     def _search(self) -> Steps[None]:
-        """Search near the incumbent while that helps, then from scratch, and merge the tours."""
+        """Search until a search finds nothing better; one step, because proofs need a good tour."""
+        run, graph = self.run, self.graph
+        if self._searches_all():
+            self.costs = CostMatrix(graph, policy=self.policy.gtsp.costs)
+            run.search(self.costs)
+            self.has_searched_all = True
+        else:
+            run.find_first_tour()
+            run.search_near_incumbent()
+        run.report("begun", vertices=len(graph))
+        yield
+
+    def _search_on(self) -> Steps[None]:
+        """Search near the incumbent while that helps, then from scratch, and merge; never ends."""
         run, graph = self.run, self.graph
         policy = run.gtsp_policy.proof_search
-        run.find_first_tour()
-        yield
-        core = cheapest_per_cluster(
-            graph.costs_to_base, graph.cluster, run.searched_classes_per_goal
-        )
         vain_searches = 0
-        while True:
+        while run.tour is not None:
             before = run.length
-            core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
+            core = np.union1d(run.classes_near_incumbent(), np.array(run.tour, dtype=np.int64))
             yield from run.search_steps(run.instance_among(core), run.clock)
             run.report("begun", vertices=len(graph))
             yield
-            if run.tour is None:
-                return
             vain_searches = 0 if run.length < before else vain_searches + 1
-            core = run.classes_near_incumbent() if len(graph) > len(core) else core
             if vain_searches == policy.max_vain_searches:
                 vain_searches = 0
                 yield from self._merge()
@@ -236,8 +264,8 @@ class Portfolio:
 
     def _walks(self) -> Steps[None]:
         """Bound tours by ng-walks, which leave fewer vertices to the cuts."""
-        run = self.run
-        costs = CostMatrix(self.graph, policy=self.policy.gtsp.costs)
+        run, graph = self.run, self.graph
+        costs, self.costs = self.costs or CostMatrix(graph, policy=self.policy.gtsp.costs), None
         yield
         yield from walk_steps(run, costs, self.policy.mip.handover)
         self.costs = costs
@@ -262,11 +290,19 @@ class Portfolio:
         elsewhere = graph.min_length_through(np.flatnonzero(others))
         costs = CostMatrix(inner.graph, policy=self.policy.gtsp.costs)
         yield
-        for _ in inner.cut_steps(costs, self.backend, None):
+        for _ in self._core_steps(inner, costs):
             inner.known_length = min(inner.known_length, run.length)
             run.raise_bound(min(inner.bound or 0.0, elsewhere))
             yield
         run.raise_bound(min(inner.bound or 0.0, elsewhere))
+
+    def _core_steps(self, inner: ScheduledRun, costs: CostMatrix) -> Steps[None]:
+        """Prove a core by cutting planes, after walks where these take less time."""
+        cuts, walks = self._estimate_of_cuts(len(costs)), self._estimate_of_walks(len(costs))
+        if walks.seconds < cuts.seconds and walks_fit(inner.graph, self.policy.gtsp.walks):
+            yield from walk_steps(inner, costs, self.policy.mip.handover)
+        if not (inner.is_done or inner.is_infeasible):
+            yield from inner.cut_steps(costs, self.backend, None)
 
     def _cuts(self) -> Steps[None]:
         """Prove by cutting planes, then by branch and cut, over what walks and covers have left."""
@@ -275,8 +311,8 @@ class Portfolio:
         run.goal_bound = self.goal_bound
         costs, self.costs = self.costs or run.starting_costs(), None
         yield
-        if costs.rows is None:
-            yield from run.search_steps(run.instance(costs, np.zeros(0, dtype=np.int64)), run.clock)
+        if costs.rows is None and not self.has_searched_all:
+            yield from run.search_steps(run.instance(costs, NO_VERTICES), run.clock)
         yield from run.cut_steps(costs, self.backend, warm)
         while not run.is_done and run.root is not None:
             # many legs are left: each search may find a tour that fixes more of them out

@@ -176,7 +176,7 @@ class TaskTimePolicy:
     s_per_covered_pair
         Time of covers for each pair of goals, s.
     s_per_label
-        Time of walks for each vertex, divided by the fourth power of the number of goals, s: labels
+        Time of walks for each vertex, divided by the fifth power of the number of goals, s: labels
         remember sets of goals, so their number grows faster than that of pairs.
     s_per_priced_leg
         Time of cutting planes for each pair of vertices, s.
@@ -186,12 +186,12 @@ class TaskTimePolicy:
         Ratio of all vertices to those of a core above which the core is a task.
     """
 
-    s_per_round: float = 3e-4
+    s_per_round: float = 1e-3
     s_per_goal_pair: float = 1e-4
     s_per_covered_pair: float = 5e-3
-    s_per_label: float = 2.5e-9
+    s_per_label: float = 2.5e-10
     s_per_priced_leg: float = 5e-6
-    s_per_cut_pair: float = 5e-4
+    s_per_cut_pair: float = 1.5e-4
     min_core_ratio: float = 2.0
 
     def __post_init__(self) -> None:
