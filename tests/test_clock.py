@@ -85,7 +85,7 @@ def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
         # one in five is there for good
         made += len(new)
         for cut in new:
-            pool.add([cut], for_good=cut.cluster % 5 == 0)
+            pool.add([cut], permanent=cut.cluster % 5 == 0)
         counts |= {c.cluster: 0 for c in new}
         prices = np.where(rng.random(len(pool)) < 0.2, -1.0, 0.0)
         slack = np.where(rng.random(len(pool)) < 0.5, 1.0, 0.0)
@@ -98,9 +98,9 @@ def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
         active = pool.active()
         if active is not None:
             pool.keep(active)
-            assert (pool.idle[~pool.for_good] < pool.policy.max_idle_rounds).all()
-        assert pool.for_good.tolist() == [c.cluster % 5 == 0 for c in pool.cuts]
-        assert pool.for_good.sum() == len(range(0, made, 5))
+            assert (pool.idle[~pool.permanent] < pool.policy.max_idle_rounds).all()
+        assert pool.permanent.tolist() == [c.cluster % 5 == 0 for c in pool.cuts]
+        assert pool.permanent.sum() == len(range(0, made, 5))
 
 
 def test_the_same_iterations_give_the_same_tour_whatever_the_machine_does():

@@ -46,14 +46,14 @@ def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(see
     links, row = no_links(goals + 1, i.largest), np.empty(i.largest)
     length = link(order, links, i.start, i.costs, row)
     assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
-    after, prior, ahead, behind, grown, rest = links
-    state = (after, prior, i.start, i.costs, ahead, behind, grown, rest, row)
+    after, prior, ahead, behind, step_ahead, step_behind = links
+    state = (after, prior, i.start, i.costs, ahead, behind, step_ahead, step_behind, row)
     for c in rng.permutation(np.arange(1, goals + 1)).tolist():
         length += take_out(c, *state)
         _same_tables(i, links)
         p, longer = best_place(
-            c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.before, ahead,
-            behind, rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+            c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.neighbours, i.before,
+            ahead, behind, step_behind, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
         )  # fmt: skip
         assert put(c, p, *state) == pytest.approx(longer, abs=1e-9)
         length += longer
@@ -73,10 +73,10 @@ def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places,
     left = order[order != c]
     links = no_links(goals + 1, i.largest)
     length = link(left, links, i.start, i.costs, np.empty(i.largest))
-    after, prior, ahead, behind, _, rest = links
+    after, prior, ahead, behind, _, step_behind = links
     p, longer = best_place(
-        c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.before, ahead,
-        behind, rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+        c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.neighbours, i.before, ahead,
+        behind, step_behind, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
     )  # fmt: skip
     each = [np.insert(left, k, c) for k in range(1, len(left) + 1)]
     kept = [o for o in each if _keeps(o, i.before)]
@@ -172,7 +172,7 @@ def _keeps(order, before):
 
 def _tables(i):
     return Tables(
-        i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before, i.min_gain,
+        i.start, i.costs, i.cluster_costs, i.near, *i.neighbours, i.rank, i.before, i.min_gain,
         i.rounding,
     )  # fmt: skip
 
@@ -190,8 +190,8 @@ def _same_tables(i, links):
         for name in ("ahead", "behind"):
             is_, should = getattr(links, name)[c, :own], getattr(fresh, name)[c, :own]
             np.testing.assert_allclose(is_, should, rtol=1e-10, atol=1e-9)
-        assert links.grown[c] == pytest.approx(fresh.grown[c], abs=1e-9)
-        assert links.rest[c] == pytest.approx(fresh.rest[c], abs=1e-9)
+        assert links.step_ahead[c] == pytest.approx(fresh.step_ahead[c], abs=1e-9)
+        assert links.step_behind[c] == pytest.approx(fresh.step_behind[c], abs=1e-9)
 
 
 COSTS = {

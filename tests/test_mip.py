@@ -732,9 +732,9 @@ def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
     proven = root.Root.steps
 
     def prove(self):
-        began = self.lp.pool.for_good.sum()
+        began = self.lp.pool.permanent.sum()
         yield from proven(self)
-        ends.append((began, self.lp.pool.for_good.sum(), len(self.lp.pool)))
+        ends.append((began, self.lp.pool.permanent.sum(), len(self.lp.pool)))
 
     monkeypatch.setattr(root.Root, "steps", prove)
     solve(travel_graph(far_world(1, goals=25, tether_length=300.0)), {"policy": policy})

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
     if args.json:
-        refuse(args, "--measures --margins", "is told in words only; expected no --json")
+        refuse(args, "--measures --margins", "has no JSON output; expected no --json")
     from netsp.base.files import is_mission_file, read_text
     from netsp.command.plot import is_scene
 

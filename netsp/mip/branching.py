@@ -182,7 +182,7 @@ class Tree:
             is_slow = k > 1 and gain < policy.min_gap_closed * (run.cutoff - bound)
             if not cuts or ((k >= policy.max_cut_rounds or is_slow) and not is_whole):
                 return bound, self._choice(point, costs, alive, node.adjacent)
-            self.root.purge(point, risen=gain > 0.0)
+            self.root.purge(point, bound_has_risen=gain > 0.0)
             lp.add_cuts(cuts)
         raise AssertionError
 

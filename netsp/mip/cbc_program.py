@@ -69,9 +69,9 @@ class CbcRelaxation:
         """Set the costs of all legs in the program."""
         self.costs = np.array(costs)
 
-    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
+    def add_cuts(self, cuts: list[Cut], *, permanent: bool = False) -> None:
         """Add cuts to the program."""
-        self.pool.add(cuts, for_good=for_good)
+        self.pool.add(cuts, permanent=permanent)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Remove all cuts but those marked."""

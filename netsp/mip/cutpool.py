@@ -27,7 +27,7 @@ class CutPool:
     ----------
     idle
         (k,) rounds that each cut has been idle.
-    for_good
+    permanent
         (k,) mask of the cuts that never count as idle.
     """
 
@@ -35,15 +35,15 @@ class CutPool:
         self.policy = policy
         self.cuts: list[Cut] = []
         self.idle: Ints = np.zeros(0, dtype=np.int64)
-        self.for_good: Bools = np.zeros(0, dtype=bool)
+        self.permanent: Bools = np.zeros(0, dtype=bool)
 
     def __len__(self) -> int:
         return len(self.cuts)
 
-    def add(self, cuts: Sequence[Cut], *, for_good: bool = False) -> None:
+    def add(self, cuts: Sequence[Cut], *, permanent: bool = False) -> None:
         """Add new cuts."""
         self.cuts += cuts
-        self.for_good = np.concatenate([self.for_good, np.full(len(cuts), for_good)])
+        self.permanent = np.concatenate([self.permanent, np.full(len(cuts), permanent)])
         self.idle = np.concatenate([self.idle, np.zeros(len(cuts), dtype=np.int64)])
 
     def replace(self, cuts: Sequence[Cut]) -> None:
@@ -55,7 +55,7 @@ class CutPool:
     def keep(self, kept: Bools) -> None:
         """Drop all cuts but those marked."""
         self.cuts = [c for c, k in zip(self.cuts, kept, strict=True) if k]
-        self.idle, self.for_good = self.idle[kept], self.for_good[kept]
+        self.idle, self.permanent = self.idle[kept], self.permanent[kept]
 
     def count(self, prices: Floats, slack: Floats) -> None:
         """Count a round, from the dual values and slacks of all cuts at its optimum."""
@@ -64,5 +64,5 @@ class CutPool:
 
     def active(self) -> Bools | None:
         """Return the mask of cuts that are not idle; None if too few are idle to remove them."""
-        kept = (self.idle < self.policy.max_idle_rounds) | self.for_good
+        kept = (self.idle < self.policy.max_idle_rounds) | self.permanent
         return None if kept.sum() >= self.policy.max_kept_share * len(kept) else kept

@@ -79,15 +79,15 @@ def contracted(n: int, edges: Edges, sink: int) -> Ints:
 
 @kernel
 def min_cuts(
-    n: int, edges: Edges, cluster: Ints, sink: int, wanted: Ints, enough: float
+    n: int, edges: Edges, cluster: Ints, sink: int, wanted: Ints, max_capacity: float
 ) -> tuple[Bools, Ints, Floats]:
-    """Return the minimum cuts between the sink and each wanted cluster that are below `enough`.
+    """Return the minimum cuts below `max_capacity` between the sink and each wanted cluster.
 
     A source with unlimited edges to the vertices of a cluster makes its cut one maximum flow, which
-    ends as soon as it is enough. Vertices are contracted first, and clusters within one contracted
-    node are cut once. If such a node has no cut below `enough`, it counts as a sink from then on
-    (Padberg & Rinaldi 1990), which makes flows short. Clusters come in the order of their distance
-    from the sink in edges, so that most lie beside a sink.
+    ends as soon as it is that large. Vertices are contracted first, and clusters within one
+    contracted node are cut once. If such a node has no cut below `max_capacity`, it counts as a
+    sink from then on (Padberg & Rinaldi 1990), which makes flows short. Clusters come in the order
+    of their distance from the sink in edges, so that most lie beside a sink.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ def min_cuts(
         is_done[last] = is_done[last] or in_one
         for e in range(len(tail)):
             network.residual[2 * e] = network.residual[2 * e + 1] = capacity[e]
-        flow = _max_flow(network, is_sink, level, enough)
-        if flow >= enough:
+        flow = _max_flow(network, is_sink, level, max_capacity)
+        if flow >= max_capacity:
             is_sink[last] = is_sink[last] or in_one
             continue
         # level marks what the source still reaches
@@ -204,8 +204,8 @@ def _distances(start: int, network: _Network) -> Ints:
 
 
 @kernel
-def _max_flow(network: _Network, is_sink: Bools, level: Ints, enough: float) -> float:
-    """Return the maximum flow from the source to the sinks by Dinic's algorithm, or `enough`.
+def _max_flow(network: _Network, is_sink: Bools, level: Ints, max_capacity: float) -> float:
+    """Return the maximum flow from the source to the sinks by Dinic's algorithm, or `max_capacity`.
 
     `level` becomes the distance of each node from the source along residual arcs, -1 if there is no
     such path.
@@ -214,10 +214,10 @@ def _max_flow(network: _Network, is_sink: Bools, level: Ints, enough: float) -> 
     queue = np.empty(nodes + 1, dtype=np.int64)
     path = np.empty(nodes + 2, dtype=np.int64)
     flow = 0.0
-    while flow < enough:
+    while flow < max_capacity:
         if not _layer(network, is_sink, level, queue):
             break
-        flow = _augmented(network, is_sink, level, path, flow, enough)
+        flow = _augmented(network, is_sink, level, path, flow, max_capacity)
     return flow
 
 
@@ -251,9 +251,9 @@ def _layer(network: _Network, is_sink: Bools, level: Ints, queue: Ints) -> bool:
 
 @kernel
 def _augmented(
-    network: _Network, is_sink: Bools, level: Ints, path: Ints, flow: float, enough: float
+    network: _Network, is_sink: Bools, level: Ints, path: Ints, flow: float, max_capacity: float
 ) -> float:
-    """Return the flow after augmenting along all paths of a layered network, or `enough`."""
+    """Return the flow after augmenting along all paths of a layered network, or `max_capacity`."""
     to, residual = network.to, network.residual
     at = network.first.copy()
     depth = 0
@@ -271,7 +271,7 @@ def _augmented(
                 if residual[a] <= RESIDUAL_TOLERANCE:
                     first_full = k
             flow += push
-            if flow >= enough:
+            if flow >= max_capacity:
                 return flow
             depth = first_full
             v = to[path[depth] ^ 1]

@@ -155,12 +155,12 @@ class HighsRelaxation:
         h.setBasis(basis)
         return value / self._scale
 
-    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
+    def add_cuts(self, cuts: list[Cut], *, permanent: bool = False) -> None:
         """Add cuts to the program."""
         step = max(self.policy.max_block_entries // max(len(self.legs), 1), 1)
         for first in range(0, len(cuts), step):
             self._add_rows(cuts[first : first + step])
-        self.pool.add(cuts, for_good=for_good)
+        self.pool.add(cuts, permanent=permanent)
 
     def _add_rows(self, cuts: list[Cut]) -> None:
         n = len(cuts)

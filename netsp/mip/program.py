@@ -170,7 +170,7 @@ class Relaxation(Protocol):
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
 
-    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
+    def add_cuts(self, cuts: list[Cut], *, permanent: bool = False) -> None:
         """Add cuts to the program; cuts added for good never count as idle."""
 
     def keep_cuts(self, keep: Bools) -> None:

@@ -91,7 +91,7 @@ class Root:
             self.lp.add_cuts(warm.lifted_cuts(costs))
         # with the goals' cuts, and the cuts of pairs that `subtours.goal_cuts` finds, the LP's
         # optimum is no lower than the optimum over goals, whatever the classes
-        self.lp.add_cuts(goal_cuts, for_good=True)
+        self.lp.add_cuts(goal_cuts, permanent=True)
         self.point: Point | None = None
         self._objective, self._reached = 0.0, 0.0
 
@@ -115,7 +115,7 @@ class Root:
                 schedule.rounds += 1
                 cuts = self.separate(point)
                 if cuts:
-                    self.purge(point, risen=False)
+                    self.purge(point, bound_has_risen=False)
                     self.lp.add_cuts(cuts)
                     continue
             priced, risen = self._price_all(point, schedule, drops=not is_settling)
@@ -134,7 +134,7 @@ class Root:
             has_stalled = self._has_stalled(schedule)
             if not priced and (has_stalled or not cuts):
                 return
-            self.purge(point, risen=risen)
+            self.purge(point, bound_has_risen=risen)
             self.lp.add_cuts(cuts)
 
     def _has_stalled(self, schedule: PricingSchedule) -> bool:
@@ -455,7 +455,7 @@ class Root:
             cuts = cuts + comb_cuts(flow, tight, cluster, policy)
         return cuts
 
-    def purge(self, point: Point, *, risen: bool) -> None:
+    def purge(self, point: Point, *, bound_has_risen: bool) -> None:
         """Count a round of all cuts, and remove idle ones if the bound has risen.
 
         While the bound does not rise, separation would only find them again.
@@ -463,7 +463,7 @@ class Root:
         assert point.slack is not None
         assert point.duals is not None
         self.lp.pool.count(point.duals.cut, point.slack)
-        active = self.lp.pool.active() if risen else None
+        active = self.lp.pool.active() if bound_has_risen else None
         if active is not None:
             self.lp.keep_cuts(active)
 

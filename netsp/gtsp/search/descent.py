@@ -28,8 +28,8 @@ def descend(
     float
         Length of the tour.
     """
-    start, costs, nearest, near, first, beside, _, before, min_gain, rounding = tables
-    after, prior, ahead, behind, grown, rest = links
+    start, costs, nearest, near, first, neighbours, _, before, min_gain, rounding = tables
+    after, prior, ahead, behind, step_ahead, step_behind = links
     n = len(order)
     row, place = np.empty(ahead.shape[1]), np.empty(n, dtype=np.int64)
     work = order.copy()
@@ -41,7 +41,7 @@ def descend(
             if stop[0] != 0:
                 break
             old_place = prior[c]
-            d = take_out(c, after, prior, start, costs, ahead, behind, grown, rest, row)
+            d = take_out(c, after, prior, start, costs, ahead, behind, step_ahead, step_behind, row)
             p, increase = best_place(
                 c,
                 after,
@@ -51,11 +51,11 @@ def descend(
                 nearest,
                 near,
                 first,
-                beside,
+                neighbours,
                 before,
                 ahead,
                 behind,
-                rest,
+                step_behind,
                 place,
                 0.0,
                 chance,
@@ -70,7 +70,7 @@ def descend(
                     p = old_place
             else:
                 p = old_place
-            put(c, p, after, prior, start, costs, ahead, behind, grown, rest, row)
+            put(c, p, after, prior, start, costs, ahead, behind, step_ahead, step_behind, row)
         if improved:
             write_order(after, work)
             measured = link(work, links, start, costs, row)

@@ -145,7 +145,7 @@ class LayeredInstance:
         return np.asarray(out | out.T)
 
     @cached_property
-    def beside(self) -> tuple[Ints, Ints]:
+    def neighbours(self) -> tuple[Ints, Ints]:
         """Clusters that each cluster may be inserted next to, nearest first: start of the stretch
         of each cluster (m + 2,), and all stretches joined."""
         c, p = np.nonzero(self.near)

@@ -1,10 +1,11 @@
 """A tour as links between clusters, with what each place in it costs.
 
 For each cluster c of the tour, ``ahead[c, j]`` is the shortest path from the base through all
-clusters before it to its vertex j, less the minimum over j, and ``grown[c]`` is the increase of
-that minimum over the one of the cluster before; ``behind[c, j]`` and ``rest[c]`` are the same for
-paths home. The base begins and ends the tour: ``rest[0]`` belongs to its first leg, ``grown[0]`` to
-its last. The tour's length is the sum of ``grown``. Between p and its successor q, cluster c costs
+clusters before it to its vertex j, less the minimum over j, and ``step_ahead[c]`` is the increase
+of that minimum over the one of the cluster before; ``behind[c, j]`` and ``step_behind[c]`` are the
+same for paths home. The base begins and ends the tour: ``step_behind[0]`` belongs to its first leg,
+``step_ahead[0]`` to its last. The tour's length is the sum of ``step_ahead``. Between p and its
+successor q, cluster c costs
 
     min over i, j, l of ahead[p, i] + c_ij + c_jl + behind[q, l]
     less min over i, l of ahead[p, i] + c_il + behind[q, l],
@@ -37,8 +38,8 @@ class Tables(NamedTuple):
     """Arrays of an instance for kernels.
 
     ``nearest`` is (m + 1, m + 1), ``rank`` (m + 1, k). The clusters that cluster c may be inserted
-    next to are ``beside[first[c]:first[c + 1]]``, as in ``near``. ``min_gain`` is the share of the
-    tour's length that a move must save, ``rounding`` the gain that rounding may feign
+    next to are ``neighbours[first[c]:first[c + 1]]``, as in ``near``. ``min_gain`` is the share of
+    the tour's length that a move must save, ``rounding`` the gain that rounding may feign
     (`LayeredInstance`). The kernels that are called most often get these arrays one by one, because
     passing a tuple of arrays on would cost more than their work.
     """
@@ -48,7 +49,7 @@ class Tables(NamedTuple):
     nearest: Floats
     near: Bools
     first: Ints
-    beside: Ints
+    neighbours: Ints
     rank: Ints
     before: Bools
     min_gain: float
@@ -62,36 +63,36 @@ class Links(NamedTuple):
     prior: Ints
     ahead: Floats
     behind: Floats
-    grown: Floats
-    rest: Floats
+    step_ahead: Floats
+    step_behind: Floats
 
 
 def no_links(clusters: int, largest: int) -> Links:
     """Return empty links of some clusters, the base included, of at most `largest` vertices."""
     ahead, behind = np.zeros((2, clusters, largest))
-    grown, rest = np.zeros((2, clusters))
+    step_ahead, step_behind = np.zeros((2, clusters))
     after, prior = np.full((2, clusters), -1, dtype=np.int64)
-    return Links(after, prior, ahead, behind, grown, rest)
+    return Links(after, prior, ahead, behind, step_ahead, step_behind)
 
 
 @kernel
-def carry_on(
+def propagate(
     c: int,
-    sure: int,
+    min_clusters: int,
     after: Ints,
     prior: Ints,
     start: Ints,
     costs: Floats,
     ahead: Floats,
-    grown: Floats,
+    step_ahead: Floats,
     row: Floats,
 ) -> float:
-    """Fill ``ahead`` and ``grown`` from cluster c on, and return the change of the tour's length.
+    """Fill ``ahead`` and ``step_ahead`` from cluster c on, and return the tour's change in length.
 
-    It ends at a cluster, after the next `sure` ones, whose numbers do not change. With ``after``
-    and ``prior`` exchanged it fills ``behind`` and ``rest``, towards the base. Numbers that are
-    equal within rounding are not rewritten: if they were, and the numbers after them were not, the
-    tables would drift apart.
+    It ends at a cluster, after the next `min_clusters` ones, whose numbers do not change. With
+    ``after`` and ``prior`` exchanged it fills ``behind`` and ``step_behind``, towards the base.
+    Numbers that are equal within rounding are not rewritten: if they were, and the numbers after
+    them were not, the tables would drift apart.
     """
     longer = 0.0
     while True:
@@ -107,11 +108,11 @@ def carry_on(
             lowest = min(lowest, best)
         if c == p:
             lowest = 0.0  # the base alone
-        longer += lowest - grown[c]
-        grown[c] = lowest
+        longer += lowest - step_ahead[c]
+        step_ahead[c] = lowest
         if c == 0:
             return float(longer)
-        is_unchanged = sure <= 0
+        is_unchanged = min_clusters <= 0
         for j in range(size):
             if abs(row[j] - lowest - ahead[c, j]) > EQUAL_LENGTHS * row[j]:
                 is_unchanged = False
@@ -119,23 +120,23 @@ def carry_on(
             return float(longer)
         for j in range(size):
             ahead[c, j] = row[j] - lowest
-        sure -= 1
+        min_clusters -= 1
         c = after[c]
 
 
-@interprets(carry_on)
-def _carry_on_in_numpy(
+@interprets(propagate)
+def _propagate_in_numpy(
     c: int,
-    sure: int,
+    min_clusters: int,
     after: Ints,
     prior: Ints,
     start: Ints,
     costs: Floats,
     ahead: Floats,
-    grown: Floats,
+    step_ahead: Floats,
     row: Floats,
 ) -> float:
-    """Vectorise `carry_on` over the vertices of a cluster."""
+    """Vectorise `propagate` over the vertices of a cluster."""
     longer = 0.0
     while True:
         p, begin, end = prior[c], start[c], start[c + 1]
@@ -143,38 +144,41 @@ def _carry_on_in_numpy(
         best = np.fmin.reduce(ahead[p, : len(legs), None] + legs, axis=0, initial=np.inf)
         row[: len(best)] = best
         lowest = 0.0 if c == p else float(best.min(initial=np.inf))
-        longer += lowest - float(grown[c])
-        grown[c] = lowest
+        longer += lowest - float(step_ahead[c])
+        step_ahead[c] = lowest
         if c == 0:
             return longer
-        rest = best - lowest
-        if sure <= 0 and not (np.abs(rest - ahead[c, : len(best)]) > EQUAL_LENGTHS * best).any():
+        above_lowest = best - lowest
+        if (
+            min_clusters <= 0
+            and not (np.abs(above_lowest - ahead[c, : len(best)]) > EQUAL_LENGTHS * best).any()
+        ):
             return longer
-        ahead[c, : len(best)] = rest
-        sure -= 1
+        ahead[c, : len(best)] = above_lowest
+        min_clusters -= 1
         c = int(after[c])
 
 
 @kernel
 def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> float:
     """Link clusters in an order, base first, fill the tables, and return the tour's length."""
-    after, prior, ahead, behind, grown, rest = links
+    after, prior, ahead, behind, step_ahead, step_behind = links
     n = len(order)
     after[:], prior[:] = -1, -1
-    grown[:], rest[:] = 0.0, 0.0
+    step_ahead[:], step_behind[:] = 0.0, 0.0
     for k in range(n):
         after[order[k]], prior[order[k]] = order[(k + 1) % n], order[k - 1]
-    carry_on(after[0], n, after, prior, start, costs, ahead, grown, row)
-    carry_on(prior[0], n, prior, after, start, costs, behind, rest, row)
-    return tour_length(after, grown)
+    propagate(after[0], n, after, prior, start, costs, ahead, step_ahead, row)
+    propagate(prior[0], n, prior, after, start, costs, behind, step_behind, row)
+    return tour_length(after, step_ahead)
 
 
 @kernel
-def tour_length(after: Ints, grown: Floats) -> float:
+def tour_length(after: Ints, step_ahead: Floats) -> float:
     """Return the length of the tour."""
-    length, c = grown[0], after[0]
+    length, c = step_ahead[0], after[0]
     while c != 0:
-        length += grown[c]
+        length += step_ahead[c]
         c = after[c]
     return float(length)
 
@@ -198,15 +202,15 @@ def put(
     costs: Floats,
     ahead: Floats,
     behind: Floats,
-    grown: Floats,
-    rest: Floats,
+    step_ahead: Floats,
+    step_behind: Floats,
     row: Floats,
 ) -> float:
     """Insert cluster c after p and return the change of the tour's length."""
     q = after[p]
     after[p], prior[c], after[c], prior[q] = c, p, q, c
-    carry_on(c, 1, prior, after, start, costs, behind, rest, row)
-    return float(carry_on(c, 1, after, prior, start, costs, ahead, grown, row))
+    propagate(c, 1, prior, after, start, costs, behind, step_behind, row)
+    return float(propagate(c, 1, after, prior, start, costs, ahead, step_ahead, row))
 
 
 @kernel
@@ -218,16 +222,16 @@ def take_out(
     costs: Floats,
     ahead: Floats,
     behind: Floats,
-    grown: Floats,
-    rest: Floats,
+    step_ahead: Floats,
+    step_behind: Floats,
     row: Floats,
 ) -> float:
     """Remove cluster c and return the change of the tour's length, which is negative."""
-    p, q, old_growth = prior[c], after[c], grown[c]
+    p, q, old_growth = prior[c], after[c], step_ahead[c]
     after[p], prior[q], after[c], prior[c] = q, p, -1, -1
-    grown[c] = 0.0
-    carry_on(p, 0, prior, after, start, costs, behind, rest, row)
-    return float(carry_on(q, 0, after, prior, start, costs, ahead, grown, row) - old_growth)
+    step_ahead[c] = 0.0
+    propagate(p, 0, prior, after, start, costs, behind, step_behind, row)
+    return float(propagate(q, 0, after, prior, start, costs, ahead, step_ahead, row) - old_growth)
 
 
 @kernel
@@ -241,14 +245,14 @@ def between(
     nearest: Floats,
     ahead: Floats,
     behind: Floats,
-    rest: Floats,
+    step_behind: Floats,
 ) -> float:
     """Return by how much inserting cluster c after p lengthens the best tour, at most `limit`."""
     q = after[p]
     now = np.inf
     for i in range(start[p + 1] - start[p]):
         now = min(now, ahead[p, i] + behind[p, i])
-    now += rest[p]
+    now += step_behind[p]
     # no leg is cheaper than the cheapest between its clusters, and both tables are 0 or more
     if nearest[p, c] + nearest[c, q] - now >= limit:
         return limit
@@ -280,14 +284,14 @@ def _between_in_numpy(
     nearest: Floats,
     ahead: Floats,
     behind: Floats,
-    rest: Floats,
+    step_behind: Floats,
 ) -> float:
     """Vectorise `between` over the vertices of the clusters."""
     q = after[p]
     left, right = start[p], start[q]
     left_end, right_end = start[p + 1], start[q + 1]
     far = ahead[p, : left_end - left]
-    now = float(np.fmin.reduce(far + behind[p, : left_end - left]) + rest[p])
+    now = float(np.fmin.reduce(far + behind[p, : left_end - left]) + step_behind[p])
     if nearest[p, c] + nearest[c, q] - now >= limit:
         return limit
     bar = float(limit + now)
@@ -309,11 +313,11 @@ def best_place(
     nearest: Floats,
     near: Bools,
     first: Ints,
-    beside: Ints,
+    neighbours: Ints,
     before: Bools,
     ahead: Floats,
     behind: Floats,
-    rest: Floats,
+    step_behind: Floats,
     place: Ints,
     blink: float,
     chance: npt.NDArray[np.uint64],
@@ -337,13 +341,14 @@ def best_place(
             if before[c, x] and open_end:
                 high, open_end = prior[x], False
             x, k = after[x], k + 1
-    best, at = between(c, low, np.inf, after, start, costs, nearest, ahead, behind, rest), low
+    at = low
+    best = between(c, low, np.inf, after, start, costs, nearest, ahead, behind, step_behind)
     if high != low:
-        d = between(c, high, best, after, start, costs, nearest, ahead, behind, rest)
+        d = between(c, high, best, after, start, costs, nearest, ahead, behind, step_behind)
         if d < best:
             best, at = d, high
     for k in range(2 * first[c], 2 * first[c + 1]):
-        p = beside[k // 2]
+        p = neighbours[k // 2]
         if after[p] < 0:
             continue
         if k % 2 == 1:
@@ -356,7 +361,7 @@ def best_place(
             continue
         if blink > 0.0 and uniform(chance) < blink:
             continue
-        d = between(c, p, best, after, start, costs, nearest, ahead, behind, rest)
+        d = between(c, p, best, after, start, costs, nearest, ahead, behind, step_behind)
         if d < best:
             best, at = d, p
     return at, best

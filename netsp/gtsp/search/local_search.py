@@ -92,7 +92,7 @@ class Search:
             i.costs,
             i.cluster_costs,
             i.near,
-            *i.beside,
+            *i.neighbours,
             i.rank,
             i.before,
             i.min_gain,

@@ -23,7 +23,7 @@ from netsp.gtsp.search.links import (
     Links,
     Tables,
     best_place,
-    carry_on,
+    propagate,
     put,
     tour_length,
     write_order,
@@ -62,11 +62,11 @@ def ruin_and_recreate(
     tuple of float
         Lengths of the present order and of the best, which is in `best`.
     """
-    start, costs, nearest, near, first, beside, rank, before, _, rounding = tables
+    start, costs, nearest, near, first, neighbours, rank, before, _, rounding = tables
     n = len(order)
     after, prior = links.after.copy(), links.prior.copy()
     ahead, behind = links.ahead.copy(), links.behind.copy()
-    grown, rest = links.grown.copy(), links.rest.copy()
+    step_ahead, step_behind = links.step_ahead.copy(), links.step_behind.copy()
     out = np.zeros(n, dtype=np.bool_)
     gone, place = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     work = np.empty(n, dtype=np.int64)
@@ -103,14 +103,14 @@ def ruin_and_recreate(
             out[c] = False
             p, q = prior[c], after[c]
             after[p], prior[q], after[c] = q, p, -1
-            d -= grown[c]
-            grown[c] = 0.0
+            d -= step_ahead[c]
+            step_ahead[c] = 0.0
         for r in range(removed):
             p, q = links.prior[gone[r]], links.after[gone[r]]
             if after[q] >= 0:
-                d += carry_on(q, 0, after, prior, start, costs, ahead, grown, row)
+                d += propagate(q, 0, after, prior, start, costs, ahead, step_ahead, row)
             if after[p] >= 0:
-                carry_on(p, 0, prior, after, start, costs, behind, rest, row)
+                propagate(p, 0, prior, after, start, costs, behind, step_behind, row)
         # inserted in random order, or farthest from the base first, or nearest first
         mode = below(4, chance)
         for r in range(removed):
@@ -137,26 +137,28 @@ def ruin_and_recreate(
                 nearest,
                 near,
                 first,
-                beside,
+                neighbours,
                 before,
                 ahead,
                 behind,
-                rest,
+                step_behind,
                 place,
                 policy.blink_rate,
                 chance,
             )
-            d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)
+            d += put(
+                gone[r], p, after, prior, start, costs, ahead, behind, step_ahead, step_behind, row
+            )
         if d < length - theta * math.log(max(uniform(chance), 1e-300)):
-            _write(links, Links(after, prior, ahead, behind, grown, rest))
-            length = tour_length(after, grown)
+            _write(links, Links(after, prior, ahead, behind, step_ahead, step_behind))
+            length = tour_length(after, step_ahead)
             if length < best_length * (1.0 - 1e-12) and (
                 best_length - length > rounding or _is_shorter(after, best, start, costs, work)
             ):
                 best_length = length
                 write_order(after, best)
         else:
-            _write(Links(after, prior, ahead, behind, grown, rest), links)
+            _write(Links(after, prior, ahead, behind, step_ahead, step_behind), links)
     write_order(links.after, order)
     return length, best_length
 
@@ -168,8 +170,8 @@ def _write(to: Links, links: Links) -> None:
     write_ints(to.prior, links.prior, len(links.prior))
     write_rows(to.ahead, links.ahead, len(links.ahead))
     write_rows(to.behind, links.behind, len(links.behind))
-    write_floats(to.grown, links.grown, len(links.grown))
-    write_floats(to.rest, links.rest, len(links.rest))
+    write_floats(to.step_ahead, links.step_ahead, len(links.step_ahead))
+    write_floats(to.step_behind, links.step_behind, len(links.step_behind))
 
 
 @kernel

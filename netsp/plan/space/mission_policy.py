@@ -290,9 +290,9 @@ class StatePolicy:
     Attributes
     ----------
     few_waypoints, many_waypoints
-        Numbers of waypoints up to which the effort per waypoint is `few` or `some`; with more,
-        it is `many`. A search then takes about a minute on two cores.
-    few, some, many
+        Numbers of waypoints up to which the effort per waypoint is `thorough` or
+        `balanced`; with more, it is `quick`. A search then takes about a minute on two cores.
+    thorough, balanced, quick
         Effort per waypoint. Around a row of piles, a path is twice as long as the distance, so few
         waypoints allow longer paths.
     n_neighbours
@@ -309,7 +309,7 @@ class StatePolicy:
 
     few_waypoints: int = 24
     many_waypoints: int = 100
-    few: StateEffort = StateEffort(
+    thorough: StateEffort = StateEffort(
         words=5,
         states=(7, 14, 28),
         paths=6,
@@ -318,7 +318,7 @@ class StatePolicy:
         detour_directions=8,
         detour_tethers=8,
     )
-    some: StateEffort = StateEffort(
+    balanced: StateEffort = StateEffort(
         words=4,
         states=(5, 10, 16, 32),
         paths=4,
@@ -327,7 +327,7 @@ class StatePolicy:
         detour_directions=6,
         detour_tethers=12,
     )
-    many: StateEffort = StateEffort(
+    quick: StateEffort = StateEffort(
         words=3,
         states=(5, 10),
         paths=4,
@@ -347,8 +347,8 @@ class StatePolicy:
     def effort(self, n_waypoints: int) -> StateEffort:
         """Return the effort for a number of waypoints."""
         if n_waypoints <= self.few_waypoints:
-            return self.few
-        return self.some if n_waypoints <= self.many_waypoints else self.many
+            return self.thorough
+        return self.balanced if n_waypoints <= self.many_waypoints else self.quick
 
 
 @dataclass(frozen=True)
