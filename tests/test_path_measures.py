@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InputError, Problem, Tethers, solve
+from netsp import Circle, InputError, Problem, Tethers, solve, verify
 from netsp.command.main import main
 from netsp.exchange.maps.gpx import read_gpx
 from netsp.exchange.maps.path_file import path_to_geojson, read_paths
@@ -37,6 +37,26 @@ def wrapped(turns, radius=2.0, corners=48):
     angle = np.pi - np.linspace(0.0, 2.0 * np.pi * turns, max(abs(turns), 1) * corners + 1)
     ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
     return np.vstack([[-4, 0], ring, [-4, 0]])
+
+
+@pytest.mark.parametrize("direction", [(1, 0), (0, 1), (-3, 4), (0.1, 0.3)])
+@given(places=st.lists(st.integers(-9, 9), min_size=1, max_size=5), at=st.integers(-2000, 2000))
+@settings(max_examples=25, deadline=None)
+def test_without_obstacles_the_tether_is_straight_also_where_all_points_are_on_one_line(
+    direction, places, at
+):
+    base = np.array([at, 2 * at], dtype=float)
+    path = base + np.outer([0, *places, 0], direction)
+    assume(np.ptp(path, axis=0).any())
+    goals = [tuple(p) for p in np.unique(path, axis=0) if np.any(p != base)]
+    problem = Problem(base=tuple(base), goals=goals, tether_length=99)
+    m = measure_path(problem, path)
+    straight = {tuple(p): math.dist(p, base) for p in path.tolist()}
+    assert m.longest_tether == pytest.approx(max(straight.values()), rel=1e-9)
+    assert m.end_tether == pytest.approx(0.0, abs=1e-9)
+    for visit in m.visits:
+        assert visit.tether == pytest.approx(straight[goals[visit.goal]], rel=1e-9)
+    assert verify(problem, solve(problem))
 
 
 @pytest.mark.parametrize("turns", [-3, -1, 1, 2])

@@ -28,6 +28,7 @@ import numpy.typing as npt
 import shapely
 
 from netsp.base.arrays import Bools, Floats, Ints
+from netsp.base.geometry.polygons import box_around
 from netsp.judge.chain import contacts_of, exact_length
 from netsp.judge.judge_policy import JudgePolicy
 from netsp.judge.orientation import Point, orientation, orientations
@@ -125,8 +126,7 @@ class StringPuller:
             points = problem.points[:, :2]
             if path is not None:
                 points = np.vstack([points, path[:, :2]])
-            box = shapely.MultiPoint(points - self.origin)
-            box = shapely.union_all([box, *shapes]).envelope.buffer(2.0 * reach, join_style="mitre")
+            box = box_around([shapely.MultiPoint(points - self.origin), *shapes], 2.0 * reach)
         return box.difference(shapely.union_all(shapes)) if shapes else box
 
     def crossings(self, path: npt.ArrayLike) -> list[list[tuple[int, bool]]]:

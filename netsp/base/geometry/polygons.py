@@ -5,10 +5,13 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import shapely
 
 Vertices = Sequence[tuple[float, float]]
 
@@ -200,3 +203,20 @@ def _chords(v: npt.NDArray[np.float64], height: float) -> list[tuple[float, floa
     a, b = v[hit], w[hit]
     xs = np.sort(a[:, 0] + (height - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
     return [(float(p), float(q)) for p, q in zip(xs[::2], xs[1::2], strict=False)]
+
+
+def box_around(shapes: Sequence[shapely.Geometry], margin: float) -> shapely.Polygon:
+    """Return the upright box around shapes, larger by a margin on each side.
+
+    Shapes on one line have an envelope without area, whose buffer is not a box.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> box_around([shapely.MultiPoint([(0, 0), (4, 0)])], 1.0).bounds
+    (-1.0, -1.0, 5.0, 1.0)
+    """
+    import shapely
+
+    left, bottom, right, top = shapely.total_bounds(np.array(shapes, dtype=object)).tolist()
+    return shapely.box(left - margin, bottom - margin, right + margin, top + margin)

@@ -20,6 +20,7 @@ import shapely
 from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
+from netsp.base.geometry.polygons import box_around
 from netsp.base.number_ranges import check_positive, check_shares
 from netsp.hsignature.signature_measures import winding_numbers
 from netsp.judge.passage import passes
@@ -137,8 +138,7 @@ class FreeSpace:
             box = shapely.box(*(np.array(problem.bounds) - np.tile(self.origin, 2)))
         else:
             every = [shapely.MultiPoint(problem.points[:, :2] - self.origin), *shapes]
-            box = shapely.union_all(every).envelope
-            box = box.buffer(policy.box_ratio * max(reach, problem.scale), join_style="mitre")
+            box = box_around(every, policy.box_ratio * max(reach, problem.scale))
         self.shape = box.difference(shapely.union_all(shapes)) if shapes else box
         shapely.prepare(self.shape)
         parts = shapely.get_parts(self.shape)
