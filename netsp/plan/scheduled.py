@@ -129,13 +129,15 @@ class Portfolio:
     def _tasks(self) -> list[Task]:
         graph, policy = self.graph, self.policy
         search = self._estimate_of_search()
-        again = self.policy.mip.merging.searches * search.seconds
+        search_on = Estimate(self.times.further_searches * search.seconds, search.bytes)
         tasks = [
             Task("search", self._search, search),
-            Task("search on", self._search_on, Estimate(again, search.bytes)),
+            Task("search on", self._search_on, search_on),
         ]
         if exact.fits(graph, policy.subsets):
-            tasks.append(Task("subsets", self._subsets, exact.estimate(graph, policy.subsets)))
+            subsets = Task("subsets", self._subsets, exact.estimate(graph, policy.subsets))
+            is_quicker = subsets.estimate.seconds < search.seconds
+            tasks.insert(0 if is_quicker else 1, subsets)  # it needs no tour to begin with
         if len(graph.before):
             if walks_fit(graph, policy.gtsp.walks):
                 tasks.append(Task("walks", self._walks, self._estimate_of_walks(len(graph))))
@@ -182,8 +184,8 @@ class Portfolio:
         return min(estimates, key=lambda estimate: estimate.seconds)
 
     def _estimate_of_covers(self) -> Estimate:
-        pairs = (self.graph.goal_count + 1) ** 2
-        return Estimate(self.times.s_per_covered_pair * pairs, 0.0)
+        seconds = self.times.s_per_covered_pair * (self.graph.goal_count + 1) ** 2
+        return Estimate(seconds + self.times.s_per_covered_class * len(self.graph), 0.0)
 
     def _subsets(self) -> Steps[None]:
         exact.solve(self.run)

@@ -175,6 +175,10 @@ class TaskTimePolicy:
         Time of the bound over goals for each pair of goals, s.
     s_per_covered_pair
         Time of covers for each pair of goals, s.
+    s_per_covered_class
+        Additional time of covers for each vertex, s.
+    further_searches
+        Number of searches after the first in which a shorter tour is expected.
     s_per_label
         Time of walks for each vertex, divided by the fifth power of the number of goals, s: labels
         remember sets of goals, so their number grows faster than that of pairs.
@@ -189,6 +193,8 @@ class TaskTimePolicy:
     s_per_round: float = 1e-3
     s_per_goal_pair: float = 1e-4
     s_per_covered_pair: float = 5e-3
+    s_per_covered_class: float = 3e-4
+    further_searches: float = 50.0
     s_per_label: float = 2.5e-10
     s_per_priced_leg: float = 5e-6
     s_per_cut_pair: float = 1.5e-4
