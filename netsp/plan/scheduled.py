@@ -276,20 +276,25 @@ class Portfolio:
                 task.estimate = self._estimate_of_cuts(len(costs))
 
     def _core(self) -> Steps[None]:
-        """Prove over a core of the classes; twice the tether of any other bounds its tours."""
+        """Prove over a core of the classes; twice the tether of any other bounds its tours.
+
+        A core whose proof would raise the bound no further is left out.
+        """
         run, graph = self.run, self.graph
         near = run.classes_near_incumbent() if run.tour is not None else None
         core = cheapest_per_cluster(graph.costs_to_base, graph.cluster, run.core_classes_per_goal)
         core = core if near is None else np.union1d(core, near)
         core = np.union1d(core, np.array(run.tour or (0,), dtype=np.int64))
+        others = np.ones(len(graph), dtype=bool)
+        others[core] = False
+        elsewhere = graph.min_length_through(np.flatnonzero(others))
+        if elsewhere <= (run.bound or 0.0):
+            return
         inner = self.core = run.run_over(graph.subgraph(core), Limits(run.clock, rng=run.rng))
         inner.iteration_limit = run.iteration_limit - run.iterations
         inner.outer = run, core
         if run.tour is not None:
             inner.update_incumbent(np.searchsorted(core, np.array(run.tour)).tolist())
-        others = np.ones(len(graph), dtype=bool)
-        others[core] = False
-        elsewhere = graph.min_length_through(np.flatnonzero(others))
         costs = CostMatrix(inner.graph, policy=self.policy.gtsp.costs)
         yield
         for _ in self._core_steps(inner, costs):
