@@ -1,7 +1,7 @@
 """Times both roadmaps and draws the convergence of PRM* towards the exact optimum.
 
 python benchmarks/roadmaps.py                 the tables
-python benchmarks/roadmaps.py --convergence   docs/prm-convergence.png and its table
+python benchmarks/roadmaps.py --convergence   docs/pictures/prm-convergence.png and its table
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
     ax.set_ylabel("per cent above the exact optimum")
     ax.set_title(f"{worlds} worlds, {seeds} seeds, 20 circles, 10 goals, tether 300", fontsize=10)
     ax.legend()
-    figure.savefig(ROOT / "docs" / "prm-convergence.png", dpi=130)
+    figure.savefig(ROOT / "docs" / "pictures" / "prm-convergence.png", dpi=130)
 
 
 def main() -> None:

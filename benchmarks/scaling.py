@@ -1,6 +1,6 @@
 """How time and memory grow with goals, classes and obstacles, with the exponents fitted.
 
-    python benchmarks/scaling.py [--worlds 2] [--limit 60] [--plot docs/scaling.png] [--keep]
+    python benchmarks/scaling.py [--worlds 2] [--limit 60] [--plot FILE] [--keep]
 
 Random worlds of the 2017 paper's recipe, one thing varied at a time: goals (tether 300, 20
 obstacles), classes (20 goals, tether 200 to 550), obstacles (20 goals, tether 300, as many to the

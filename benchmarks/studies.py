@@ -1,4 +1,4 @@
-"""The tables of docs/reproduction.md from the rows of the papers' studies.
+"""The tables of docs/notebook/reproduction.md from the rows of the papers' studies.
 
     python benchmarks/studies.py [--keep]
     python benchmarks/studies.py --take STUDY ROWS     ROWS (JSONL) become studies/results/STUDY

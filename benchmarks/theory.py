@@ -1,6 +1,6 @@
-"""The figures of docs/theory.md, each drawn from what the code computes.
+"""The figures of docs/theory, each drawn from what the code computes.
 
-    python benchmarks/theory.py [--folder docs]
+    python benchmarks/theory.py [--folder docs/pictures]
 
 Words and lengths in them are those of the paths that are drawn; a string among slits is as long as
 `netsp.roadmap.slits` says it is, or no figure is written.
@@ -261,7 +261,9 @@ FIGURES: dict[str, Callable[[], Any]] = {
 def main() -> None:
     """Write them."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--folder", type=Path, default=Path(__file__).parent.parent / "docs")
+    parser.add_argument(
+        "--folder", type=Path, default=Path(__file__).parent.parent / "docs/pictures"
+    )
     args = parser.parse_args()
     for name, draw in FIGURES.items():
         file = args.folder / f"theory-{name}.png"

@@ -1,4 +1,4 @@
-"""docs/architecture.md says how the modules depend on one another; here it is checked."""
+"""docs/contributing/architecture says how the modules depend on one another; here it is checked."""
 
 import ast
 import functools
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / "docs" / "architecture.md").read_text()
+PAGE = (ROOT / "docs/contributing/architecture.md").read_text()
 MODULES = {
     ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p
     for p in (ROOT / "netsp").rglob("*.py")

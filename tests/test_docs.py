@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 from pages import PAGES, blocks, run_page  # noqa: E402
 
-QUICK = ("docs/solvers.md", "docs/tether.md")
+QUICK = ("docs/reference/solvers.md", "docs/theory/tether.md")
 """Pages that take seconds; `make accept` runs the others, too."""
 
 
@@ -115,13 +115,14 @@ def test_the_version_is_the_same_wherever_it_is_said():
 def test_the_site_has_every_page_every_public_name_and_every_field():
     """What is named is found when the site is built (`make docs`): there a warning is an error."""
     site = (ROOT / "mkdocs.yml").read_text()
-    assert all(f": {page.name}\n" in site for page in (ROOT / "docs").glob("*.md"))
-    reference = (ROOT / "docs" / "reference.md").read_text()
+    pages = [p.relative_to(ROOT / "docs").as_posix() for p in (ROOT / "docs").rglob("*.md")]
+    assert all(f": {page}\n" in site for page in pages)
+    reference = (ROOT / "docs/reference/python.md").read_text()
     errors = vars(importlib.import_module("netsp.base.errors"))
     for name in netsp.__all__:
         assert re.search(rf"^::: netsp[\w.]*\.{name}$", reference, re.M) or name in errors, name
-    pages = runpy.run_path(str(ROOT / "docs" / "hooks" / "pages.py"))
-    shown = "\n".join(pages["formats"]())
+    hooks = runpy.run_path(str(ROOT / "docs" / "hooks" / "pages.py"))
+    shown = "\n".join(hooks["formats"]())
     for model in (Problem, Solution, Mission):
         assert all(f"| `{field}` |" in shown for field in model.model_fields)
 

@@ -1,4 +1,4 @@
-"""Every kind of picture against the list in docs/style.md."""
+"""Every kind of picture against the list in docs/contributing/pictures.md."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""The figures of docs/theory.md show what they say: each checks the lengths and words it draws."""
+"""The figures of docs/theory show what they say: each checks the lengths and words it draws."""
 
 import sys
 from pathlib import Path
@@ -13,7 +13,7 @@ from theory import FIGURES
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_of_the_theory_is_drawn_from_what_it_says(name):
     figure = FIGURES[name]()
-    assert (Path(__file__).parent.parent / "docs" / f"theory-{name}.png").exists()
+    assert (Path(__file__).parent.parent / "docs/pictures" / f"theory-{name}.png").exists()
     for ax in figure.axes:
         assert ax.get_xlabel()
         assert ax.get_ylabel()

@@ -124,7 +124,7 @@ def farm() -> tuple[str, bool]:
 
 
 def arranged() -> tuple[str, bool]:
-    """Orders given in part, of docs/solvers.md; the same lengths, proven."""
+    """Orders given in part, of docs/reference/solvers.md; the same lengths, proven."""
     from arranged import arranged as world
 
     from netsp import Status, solve, verify
@@ -182,7 +182,7 @@ def spellings() -> tuple[str, bool]:
 
 
 def chart() -> tuple[str, bool]:
-    """Import of the chart of docs/sites.md, and a proven tour of its piers."""
+    """Import of the chart of docs/guide/bring-your-site-in.md, and a proven tour of its piers."""
     from netsp import Status, solve, verify
     from netsp.exchange.maps.options import InspectionOptions, SiteOptions
     from netsp.exchange.maps.projection import Projection

@@ -4,6 +4,7 @@ pages beside the shipped problems and scenes, and the notebooks, run while the s
 from __future__ import annotations
 
 import importlib
+import posixpath
 import re
 import runpy
 from pathlib import Path
@@ -17,7 +18,7 @@ from nbconvert import MarkdownExporter
 from nbconvert.preprocessors import ExecutePreprocessor
 
 ROOT = Path(__file__).parents[2]
-BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
+BESIDE = {"reference/problems.md": "problems/README.md", "reference/scenes.md": "scenes/README.md"}
 EXAMPLES = ROOT / "examples"
 FORMATS, LICENCES = "<!-- formats -->", "<!-- licences -->"
 MODULES, TOLERANCES = "<!-- modules -->", "<!-- tolerances -->"
@@ -26,7 +27,8 @@ MODULES, TOLERANCES = "<!-- modules -->", "<!-- tolerances -->"
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Pages that lie beside what they are about."""
     for name, source in BESIDE.items():
-        files.append(File.generated(config, name, content=(ROOT / source).read_text()))
+        text = linked_from(name, (ROOT / source).read_text(), Path(source).parent)
+        files.append(File.generated(config, name, content=text))
     for notebook in sorted(EXAMPLES.glob("*.ipynb")):
         for name, content in run(notebook).items():
             files.append(File.generated(config, name, content=content))
@@ -43,15 +45,43 @@ def run(notebook: Path) -> dict[str, str | bytes]:
     text, resources = exporter.from_notebook_node(
         book, resources={"unique_key": f"{notebook.stem}-pictures"}
     )
-    text = text.replace("](../docs/", "](").replace(".ipynb)", ".md)")
-    return {f"{notebook.stem}.md": text, **resources["outputs"]}
+    text = linked_from(f"tutorials/{notebook.stem}.md", text, Path("examples"))
+    pictures = {f"tutorials/{name}": data for name, data in resources["outputs"].items()}
+    return {f"tutorials/{notebook.stem}.md": text, **pictures}
+
+
+def linked_from(page: str, markdown: str, folder: Path) -> str:
+    """Return the text with its links as seen from a page of the site.
+
+    Parameters
+    ----------
+    page : str
+        File of the site that holds the text.
+    markdown : str
+        Text whose links start from `folder` of the repository.
+    folder : Path
+        Folder of the repository, relative to its root.
+    """
+
+    def link(match: re.Match[str]) -> str:
+        path, mark, anchor = match[1].partition("#")
+        target = posixpath.normpath(posixpath.join(folder.as_posix(), path))
+        shown = {source: name for name, source in BESIDE.items()}.get(target, target)
+        if "://" in path or not path:
+            return match[0]
+        if re.fullmatch(r"examples/[\w-]+\.ipynb", target):
+            shown = f"tutorials/{Path(target).stem}.md"
+        shown = shown.removeprefix("docs/")
+        return f"]({posixpath.relpath(shown, posixpath.dirname(page) or '.')}{mark}{anchor})"
+
+    return re.sub(r"\]\(([^)\s]+)\)", link, markdown)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Links to those pages, and the formats where they belong."""
-    for name, source in BESIDE.items():
-        markdown = markdown.replace(f"](../{source}", f"]({name}")
-    markdown = re.sub(r"\]\(\.\./examples/([\w-]+)\.ipynb", r"](\1.md", markdown)
+    if page.file.generated_by is None:
+        here = page.file.src_uri
+        markdown = linked_from(here, markdown, Path("docs") / posixpath.dirname(here))
     if FORMATS in markdown:
         markdown = markdown.replace(FORMATS, "\n".join(formats()))
     if LICENCES in markdown:

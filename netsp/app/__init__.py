@@ -1,1 +1,1 @@
-"""Plan on a map, in the browser (`netsp app`, docs/app.md)."""
+"""Plan on a map, in the browser (`netsp app`, docs/guide/plan-on-the-map.md)."""

@@ -158,7 +158,7 @@ def imported(
     answers: ImportAnswers | None = None,
     policy: AppPolicy = AppPolicy(),
 ) -> tuple[dict[str, Any], list[str]]:
-    """Read the problem in a file: a problem file, or a map (docs/sites.md).
+    """Read the problem in a file: a problem file, or a map (docs/guide/bring-your-site-in.md).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Exceptions of netsp. Each has one exit code of the command line (docs/architecture.md)."""
+"""Exceptions of netsp. Each has one exit code of the command line (docs/contributing/architecture)."""
 
 from __future__ import annotations
 

@@ -268,7 +268,7 @@ SILENT = Option("--quiet", "no progress")
 JSON = Option("--json", "print the summary as JSON on stdout (data then needs -o FILE)")
 PARAMS = Option(
     "--option NAME=VALUE",
-    "an option of the solver, as docs/solvers.md lists them; may be repeated",
+    "an option of the solver, as docs/reference/solvers.md lists them; may be repeated",
     option,
     repeats=True,
 )

@@ -117,7 +117,7 @@ FOR_PROBLEMS = (
     ),
     Option(
         "--margin R",
-        "plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
+        "plan so that every obstacle may be off by R; default 0 (docs/guide/tether-and-station.md)",
         length,
         0.0,
     ),
@@ -143,8 +143,8 @@ APP = Command(
     "netsp app problems/wharf.json",
     Option(
         "[PROBLEM]",
-        "problem file (JSON), made if there is none, or a map of a site (docs/sites.md); default: "
-        "an empty map without a file; with --show a solution file, or the folder of a run",
+        "problem file (JSON), made if there is none, or a map of a site "
+        "(docs/guide/bring-your-site-in.md); default: an empty map without a file; with --show a solution file, or the folder of a run",
     ),
     Option(
         "--show",
@@ -628,7 +628,7 @@ IMPORT = Command(
     Input(
         "SITE",
         "map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, GPX, .plan or .waypoints; or an "
-        "occupancy image: YAML, PNG, PGM (docs/sites.md)",
+        "occupancy image: YAML, PNG, PGM (docs/guide/bring-your-site-in.md)",
     ),
     Option(
         "--base LAT,LON[,HEADING]",

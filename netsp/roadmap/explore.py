@@ -4,7 +4,7 @@ One kernel answers two questions. *Which classes reach a goal within the tether?
 grows during the search; it holds all words, or all that do not loop. *How long are the legs between
 given classes?* The trie is given; it holds their words with all prefixes. These words are the
 *core* of the trie. Each taut path is generated once, and is the only one of its class
-(docs/theory.md).
+(docs/theory).
 
 A taut path can cross a ray and cross it back where the ray passes through another obstacle, so the
 word of its beginnings may leave the core for a while. Such *pending* letters are followed as long

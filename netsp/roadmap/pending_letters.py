@@ -4,7 +4,7 @@ A taut path may cross the ray of an obstacle and cross it back without going rou
 the ray cuts a part off another obstacle and the path bends around that part. The part is on the far
 side of the ray, as seen from the representative point of the other obstacle. In between, the path
 stays in the convex hull of the piece of the ray between both crossings and these parts (lemma on
-pending letters in docs/theory.md).
+pending letters in docs/theory).
 """
 
 from __future__ import annotations

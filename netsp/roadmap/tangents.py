@@ -2,7 +2,7 @@
 
 Nodes are directed arcs (arc, sense) and points (base, goals). The departures of a directed arc are
 in the order in which a robot that slides along the arc meets them. A taut path consists of such
-steps only: arrive, slide in the same sense, depart (docs/theory.md).
+steps only: arrive, slide in the same sense, depart (docs/theory).
 """
 
 from __future__ import annotations

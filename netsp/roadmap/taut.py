@@ -1,6 +1,6 @@
 """Exact roadmap: every taut class of every goal, and the exact length of every leg.
 
-Facts used (docs/theory.md): a homotopy class holds exactly one taut path; a taut path alternates
+Facts used (docs/theory): a homotopy class holds exactly one taut path; a taut path alternates
 common tangents and arcs; a leg between two admissible classes never needs more tether than its ends
 do, so its cost is the length of the taut path of the word ``h_i^-1 h_j`` and depends on nothing
 else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)``.
@@ -41,7 +41,7 @@ class TautRoadmap:
     ----------
     classes
         ``all`` whose taut tether fits, or ``non-looping``, the rule of the 2017 paper, which drops
-        some of them (`netsp.hsignature.is_looping`; docs/theory.md, fact 7).
+        some of them (`netsp.hsignature.is_looping`; docs/theory, fact 7).
     max_classes
         Maximum number of classes, about; by default that of the policy. If there are more, the
         shortest of every goal are kept.

@@ -13,7 +13,7 @@ retraces its path back to the start position, ensuring no entanglements". It has
   the 2017 paper, so the tour is that of `greedy`.
 
 On the covering space a leg between two admissible classes never needs more tether than its ends do
-(docs/theory.md), so "does not violate the tether length" means: is a vertex of the travel graph.
+(docs/theory), so "does not violate the tether length" means: is a vertex of the travel graph.
 With a roadmap every vertex is joined to every other, so greedy always succeeds. On a graph made
 from costs it can run into a dead end, and then finds no tour. Such a graph has no path to retrace
 (its costs need not be those of a metric), so there the tour is closed by its own leg.

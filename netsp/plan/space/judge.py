@@ -46,7 +46,7 @@ class JudgePolicy:
     max_length_error
         Share of a stated tether length, in addition to the mission's resolution, by which the
         length at the other resolution may differ: three times the worst difference between two
-        resolutions (docs/tether.md).
+        resolutions (docs/theory/tether.md).
     tether_share
         Share of the tether within which a waypoint must not be left out.
     """

@@ -48,7 +48,7 @@ DEPTH_TOLERANCE = 1e-3
 
 DIP_RATIO = 0.15
 """Tolerance of the tether model as a share of delta: edges of a tether dip into a surface by up to
-an eighth of delta (docs/tether.md)."""
+an eighth of delta (docs/theory/tether.md)."""
 
 
 @dataclass(frozen=True)
@@ -301,7 +301,7 @@ class PlanningContext:
         meanwhile.
 
         Around solids in space the length of the tether is not convex along a straight leg, as it is
-        in the plane (docs/theory.md, fact 2): it may be longer on the leg than at both ends. So the
+        in the plane (docs/theory, fact 2): it may be longer on the leg than at both ends. So the
         length is computed in steps (`drive_step`).
 
         Parameters

@@ -1,7 +1,7 @@
 """Taut tether that a robot carries along a path.
 
 The straight segments of a free path lift to geodesics of the covering space, whose distance
-function is convex (docs/theory.md), so the tether is longest at a point of the path. Between two
+function is convex (docs/theory), so the tether is longest at a point of the path. Between two
 points its length changes by at most the length of the path between them, so points that cannot beat
 the longest tether found so far need no string pulling.
 """

@@ -30,7 +30,7 @@ These points are open in the listing, and are read as follows:
   the next waypoint "that has not yet been reached", so it counts.
 - Path home. The draft has none; it is that of `react`, back along the tether.
 
-`benchmarks/draft_readings.py` flies the other readings, too (docs/reproduction.md).
+`benchmarks/draft_readings.py` flies the other readings, too (docs/notebook/reproduction.md).
 
 Nodes of a taut tether lie on surfaces. The path back is pushed off them, because the robot needs
 room.

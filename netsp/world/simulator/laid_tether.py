@@ -16,7 +16,7 @@ from netsp.world.tether import Tether
 
 STATE_TETHER_DEPTH = 0.25
 """Tolerance for the depth of a state's tether in a solid, as a share of delta. Edges of a taut
-tether cut into surfaces by an eighth (docs/tether.md), and files round them."""
+tether cut into surfaces by an eighth (docs/theory/tether.md), and files round them."""
 
 
 def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:

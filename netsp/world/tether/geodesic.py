@@ -1,7 +1,7 @@
 """`geodesic`: a tether that is the locally shortest curve of its homotopy class.
 
 The tether passes through nothing thicker than 1.8 delta, and its length is that of the curve, not
-of its chords; `netsp.world.tether.pull` and docs/tether.md explain why. Where the shortest curve of
+of its chords; `netsp.world.tether.pull` and docs/theory/tether say why. Where the shortest curve of
 a class is unique, as among vertical prisms, it depends only on the robot's position and the class,
 so driving back undoes driving. Elsewhere a class may have several locally shortest curves, for
 example if the tether could slip off the end of a pipe. Then the tether stays on the curve to which
