@@ -1,4 +1,4 @@
-"""Exceptions of netsp. Each has one exit code of the command line (docs/contributing/architecture)."""
+"""Exceptions of netsp. Each has one exit code of the command line (docs/reference/statuses)."""
 
 from __future__ import annotations
 

@@ -144,7 +144,8 @@ APP = Command(
     Option(
         "[PROBLEM]",
         "problem file (JSON), made if there is none, or a map of a site "
-        "(docs/guide/bring-your-site-in.md); default: an empty map without a file; with --show a solution file, or the folder of a run",
+        "(docs/guide/bring-your-site-in.md); default: an empty map without a file; with --show "
+        "a solution file, or the folder of a run",
     ),
     Option(
         "--show",

@@ -8,7 +8,7 @@ base. So the reduced graph is the travel graph on the vertices of shortest tethe
 solved by `mip`, with equation (2) trivially satisfied.
 
 The paper reports tours within 5 % of the optimum. Its recipe alone does not reach that (figures in
-docs/reference/solvers): the classes of shortest tether are too few to pass an obstacle on one side and
+docs/notebook): the classes of shortest tether are too few to pass an obstacle on one side and
 come back on the other. So by default three classes are kept for every goal, and the classes along
 the order found are chosen again, exactly and from all, by a shortest path through layers.
 ``classes=1 polish=0`` is the paper's.
