@@ -1,4 +1,5 @@
-"""Other people's solvers, tether models and planners: by entry points, and as plain callables."""
+"""Other people's solvers, roadmaps, tether models, planners, vehicles and readers of maps: by entry
+points, and as plain callables."""
 
 import dataclasses
 import json
@@ -11,11 +12,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
-from netsp import InputError, Problem, Solution, Status, TravelGraph, solve, solve_graph, verify
+from netsp import (
+    InputError,
+    Problem,
+    Solution,
+    Status,
+    TravelGraph,
+    solve,
+    solve_graph,
+    travel_graph,
+    verify,
+)
 from netsp.base.number_ranges import check_not_negative
 from netsp.base.registry import Registry
 from netsp.command.main import main
+from netsp.exchange.maps.feature import Feature, Map
+from netsp.exchange.maps.read_map import MAP_READERS
+from netsp.exchange.maps.site_import import read_site
 from netsp.gtsp.params import read_params
 from netsp.gtsp.travel.result import Result
 from netsp.study.compare.rows import read_rows
@@ -28,6 +43,7 @@ from netsp.world.simulator.mission_run import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 WHARF = ROOT / "problems" / "wharf.json"
+POST = {"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}}
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +68,7 @@ def installed(tmp_path_factory):
         for group, names in project["entry-points"].items()
     ]
     (info / "entry_points.txt").write_text("\n".join(groups))
-    return {**os.environ, "PYTHONPATH": str(place)}
+    return {**os.environ, "PYTHONPATH": f"{place}{os.pathsep}{ROOT}"}
 
 
 def netsp(env, *args, cwd):
@@ -220,7 +236,7 @@ def test_what_other_packages_raise_is_told_in_one_line(tmp_path):
         "[netsp.solvers]\nfails = broken:fails\nleaves = broken:leaves\n"
         "unloadable = unloadable:solve\n[netsp.roadmaps]\nplain = broken:Plain\n"
     )
-    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    env = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     for name, said in (("fails", "ZeroDivisionError"), ("leaves", "SystemExit: 7"),
                        ("unloadable", "cannot be loaded: ZeroDivisionError")):  # fmt: skip
         done = netsp(env, "solve", WHARF, "--solver", name, "--quiet", cwd=tmp_path)
@@ -243,8 +259,7 @@ def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     class Straight(Planner):
         name = "straight on"
 
-    post = {"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}}
-    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [post]})
+    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]})
     mission = Mission(
         scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
         waypoints=[(-2, 1, 0), (-2, 2, 0)], speed=0.5,
@@ -253,6 +268,128 @@ def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     assert run.planner == "straight on"
     assert run.summary["visited"] == 2
     assert len(seen) > 10
+
+
+def nearest_classes(problem, *, count: int = 2, seed: int = -1):
+    """Return the travel graph of the classes with the shortest tethers."""
+    graph = travel_graph(problem)
+    kept = [sorted(graph.members(c), key=lambda v: graph.tethers[v])[:count]
+            for c in range(1, graph.goal_count + 1)]  # fmt: skip
+    part = graph.subgraph([0, *(v for vertices in kept for v in vertices)])
+    part.seed_of_run = seed
+    return part
+
+
+def test_a_plain_function_is_a_roadmap():
+    """Its bounds hold along it only, and options and seed come by name."""
+    problem = Problem.load(WHARF)
+    found = solve(problem, roadmap=nearest_classes)
+    assert (found.roadmap, found.status) == ("nearest_classes", Status.OPTIMAL_OF_ROADMAP)
+    assert verify(problem, found)
+    assert found.length >= solve(problem).length
+    one = travel_graph(problem, nearest_classes, count=1, seed=7)
+    assert (len(one), one.seed_of_run) == (9, 7)
+    with pytest.raises(InputError, match="'nearest_classes': unknown option 'size'; expected one"):
+        solve(problem, roadmap=nearest_classes, roadmap_options={"size": 1})
+    with pytest.raises(InputError, match="expected a TravelGraph from it, got 5"):
+        solve(problem, roadmap=lambda problem: 5)
+
+
+def test_a_roadmap_of_another_module_is_given_the_seed_and_compared_in_studies(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "roadmap_here.py").write_text(
+        "from netsp import InputError, travel_graph\n"
+        "def seeded(problem, *, seed=-1):\n"
+        "    if seed not in (-1, 3): raise InputError(f'got seed {seed}')\n"
+        "    return travel_graph(problem)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [p for p in sys.path if p])
+    found = solve(Problem.load(WHARF), roadmap="roadmap_here:seeded", seed=3)
+    assert (found.roadmap, found.status) == ("roadmap_here:seeded", Status.OPTIMAL_OF_ROADMAP)
+    with pytest.raises(InputError, match="got seed 4"):
+        solve(Problem.load(WHARF), roadmap="roadmap_here:seeded", seed=4)
+    study = {"name": "own", "goals": [3], "tether_lengths": [200], "time_limit": 5, "seeds": [3],
+             "worlds": {"count": 1}, "solvers": [{"name": "auto"}],
+             "roadmaps": [{"name": "roadmap_here:seeded"}]}  # fmt: skip
+    compare(Study.checked(study, "test"), tmp_path / "rows.jsonl")
+    (row,) = read_rows(tmp_path / "rows.jsonl")
+    assert row["status"] == "optimal_of_roadmap"
+    study["roadmaps"] = [{"name": "no_such_roadmap"}]
+    with pytest.raises(InputError, match="unknown roadmap 'no_such_roadmap'; expected one of taut"):
+        Study.checked(study, "test")
+
+
+def test_a_vehicle_may_be_a_class_of_ones_own():
+    class Teleporter:
+        def __init__(self, place, speed):
+            self.position, self.yaw, self.control_s = np.array(place, dtype=float), 0.0, []
+
+        def go(self, path, seconds, yaw, water, fresh, pull=None):
+            self.position = np.array(path[0])
+            return [self.position], 1
+
+        def stop_at(self, place):
+            self.position = np.array(place)
+
+    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]})
+    mission = Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
+        waypoints=[(-2, 4, 0)], speed=0.1,
+    )  # fmt: skip
+    run = simulate(mission, "none", vehicle=Teleporter, scene=scene)
+    assert run.summary["visited"] == 1
+    assert run.summary["inspection_s"] < 1.0
+
+
+READER = """
+import shapely
+from netsp.exchange.maps.feature import Feature, Map
+
+def read(file):
+    place = {"base": (0, 0), "goal": (3, 4)}
+    features = [Feature(f"{kind}[0]", kind, "", {"kind": kind}, shapely.Point(place[kind]))
+                for kind in open(file).read().split()]
+    return Map(tuple(features), False, {f.layer: 1 for f in features}, metres=1.0)
+
+def read_wrong(file): return 5
+"""
+
+
+def test_a_reader_of_maps_of_another_package_is_found_by_its_extension(tmp_path):
+    (tmp_path / "reader.py").write_text(READER)
+    info = tmp_path / "reader-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: reader\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(
+        "[netsp.maps]\nwords = reader:read\nwrong = reader:read_wrong\ngeojson = reader:read\n"
+    )
+    env = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+    (tmp_path / "site.words").write_text("base goal")
+    done = netsp(env, "import", "site.words", "--tether", 6, "-o", "site.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert solve(Problem.load(tmp_path / "site.json")).length == pytest.approx(10.0)
+    for name, text, code, said in (
+        ("a.words", "tree", 1, "reader of .words failed: KeyError: 'tree'"),
+        ("a.wrong", "", 2, "reader of .wrong: expected a Map from it, got 5"),
+        ("a.geojson", "base goal", 2, "JSON"),  # the extension of a format of netsp's own
+    ):
+        (tmp_path / name).write_text(text)
+        done = netsp(env, "import", name, "--tether", 6, "-o", "a.json", cwd=tmp_path)
+        assert done.returncode == code, done.stderr
+        assert said in done.stderr
+
+
+def test_a_reader_of_maps_may_be_a_function_of_ones_own(tmp_path, monkeypatch):
+    def read(file):
+        point = {"base": shapely.Point(0, 0), "goal": shapely.Point(2, 0)}
+        features = [Feature(f"{k}[0]", k, "", {"kind": k}, p) for k, p in point.items()]
+        return Map(tuple(features), False, {"base": 1, "goal": 1}, metres=1.0)
+
+    monkeypatch.setitem(MAP_READERS, "mine", read)
+    (tmp_path / "site.mine").write_text("")
+    assert solve(read_site(tmp_path / "site.mine", tether=3.0)).length == 4.0
 
 
 def test_a_name_of_ours_cannot_be_taken_and_a_broken_package_costs_one_line(monkeypatch):

@@ -36,6 +36,10 @@ from netsp.roadmap.travel_graph import TravelGraph
 SolverLike = str | Callable[..., Any]
 """A solver's name, or a callable that takes a travel graph (`netsp.plan.custom`)."""
 
+RoadmapLike = str | Callable[..., Any]
+"""A roadmap's name, or a callable that takes a problem; it returns a travel graph, or an object
+with `to_travel_graph()`."""
+
 MAX_SEED = 2**62
 """Format of result tables: largest seed or iteration limit, a signed 64-bit integer."""
 
@@ -49,8 +53,8 @@ DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
 
-def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
-    """Return the named roadmap over a problem.
+def build_roadmap(problem: Problem, roadmap: RoadmapLike = DEFAULT_ROADMAP, **options: Any) -> Any:
+    """Return a roadmap over a problem, by name or by calling a factory.
 
     Raises
     ------
@@ -61,6 +65,8 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if callable(roadmap):
+        return _built(problem, name_of(roadmap), roadmap, options)
     record = ROADMAPS.named(roadmap)
     if record.ours:
         return _built(problem, roadmap, load(record.build), options)
@@ -69,27 +75,46 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 
 
 def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) -> Any:
-    known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    known = _option_names(build)
     if isinstance(options.get("time_limit"), Clock) and "time_limit" not in known:
         del options["time_limit"]  # a roadmap of another package, which has no clock
     unknown = sorted(set(options) - known)
     if unknown:
-        raise InputError(
-            f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; expected one of "
-            f"{', '.join(sorted(known))}"
-        )
+        choices = f"expected one of {', '.join(sorted(known))}" if known else "it takes none"
+        raise InputError(f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; {choices}")
     return build(problem, **options)
 
 
-def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
-    """Return the travel graph of a problem by the named roadmap.
+def _option_names(build: Callable[..., Any]) -> set[str]:
+    """Return the options of a roadmap: the keyword-only parameters of its factory."""
+    parameters = inspect.signature(build).parameters
+    return {k for k, p in parameters.items() if p.kind == p.KEYWORD_ONLY}
+
+
+def _takes_seed(roadmap: RoadmapLike) -> bool:
+    """Return whether a roadmap is given the run's seed: one of another package is if it has an
+    option `seed`."""
+    if callable(roadmap):
+        return "seed" in _option_names(roadmap)
+    record = ROADMAPS.named(roadmap)
+    if record.ours:
+        return record.seeded
+    with foreign(f"roadmap {roadmap!r} failed"):
+        return "seed" in _option_names(load(record.build))
+
+
+def travel_graph(
+    problem: Problem, roadmap: RoadmapLike = DEFAULT_ROADMAP, **options: Any
+) -> TravelGraph:
+    """Return the travel graph of a problem by a roadmap.
 
     Parameters
     ----------
     problem : Problem
         Problem.
-    roadmap : str
-        Name of the roadmap.
+    roadmap : str or callable
+        Name of the roadmap, or callable `f(problem) -> TravelGraph`, whose keyword-only parameters
+        are its options.
     **options : Any
         Options of the roadmap, as `roadmap_options` of `solve`.
 
@@ -109,26 +134,40 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
     return _graph_of_places(problem, roadmap, options)
 
 
-def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) -> TravelGraph:
+def _graph_of_places(
+    problem: Problem, roadmap: RoadmapLike, options: dict[str, Any]
+) -> TravelGraph:
     """Return the travel graph whose goals are the places of the problem."""
     if problem.state is not None:
         if roadmap != "taut":
-            raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
+            raise InputError(f"state: needs roadmap 'taut', got {name_of(roadmap)!r}")
         from netsp.roadmap.from_state import graph_from_state
 
         return graph_from_state(problem, **options)
     built = build_roadmap(problem, roadmap, **options)
-    if ROADMAPS.named(roadmap).ours:
+    if isinstance(roadmap, str) and ROADMAPS.named(roadmap).ours:
         graph: TravelGraph = built.to_travel_graph()
+    elif callable(roadmap):
+        graph = _foreign_graph(built, name_of(roadmap))
     else:
         with foreign(f"roadmap {roadmap!r} failed"):
-            graph = built.to_travel_graph()
-        if not isinstance(graph, TravelGraph):
-            raise InputError(
-                f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}"
-            )
-        graph.declared_scope = Scope.ROADMAP  # netsp cannot check that it holds all tours
+            graph = _foreign_graph(built, roadmap)
     graph.before = problem.precedences
+    return graph
+
+
+def _foreign_graph(built: Any, name: str) -> TravelGraph:
+    """Return the travel graph of a roadmap of another package.
+
+    Its bounds hold along this roadmap: netsp cannot check that the graph has all tours.
+    """
+    graph = built if isinstance(built, TravelGraph) else None
+    if hasattr(built, "to_travel_graph"):
+        graph = built.to_travel_graph()
+    if not isinstance(graph, TravelGraph):
+        got = shown(built if graph is None else graph)
+        raise InputError(f"roadmap {name!r}: expected a TravelGraph from it, got {got}")
+    graph.declared_scope, graph.roadmap = Scope.ROADMAP, name
     return graph
 
 
@@ -240,16 +279,16 @@ def policy_of(solver: SolverLike, params: Mapping[str, Any] | None) -> SolvePoli
     return policy if isinstance(policy, SolvePolicy) else SolvePolicy()
 
 
-def name_of(solver: SolverLike) -> str:
-    """Return the name of a solver in solution files."""
-    return solver if isinstance(solver, str) else getattr(solver, "__name__", "custom")
+def name_of(part: SolverLike | RoadmapLike) -> str:
+    """Return the name of a solver or roadmap in solution files."""
+    return part if isinstance(part, str) else getattr(part, "__name__", "custom")
 
 
 def solve(
     problem: Problem,
     solver: SolverLike = DEFAULT_SOLVER,
     *,
-    roadmap: str = DEFAULT_ROADMAP,
+    roadmap: RoadmapLike = DEFAULT_ROADMAP,
     roadmap_options: Mapping[str, Any] | None = None,
     time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
@@ -272,8 +311,9 @@ def solve(
         Problem.
     solver : str or callable
         Solver, as in `solve_graph`.
-    roadmap : str
-        Name of the roadmap: `taut` (exact), `prm`, or one of another package.
+    roadmap : str or callable
+        Name of the roadmap: `taut` (exact), `prm`, or one of another package; or a callable, as in
+        `travel_graph`.
     roadmap_options : mapping, optional
         For ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
     time_limit : float or Clock, optional
@@ -379,7 +419,7 @@ def solve(
     clock = Clock(seconds, within=within, should_stop=should_stop)
     with contextlib.closing(clock):
         options: dict[str, Any] = dict(roadmap_options or {})
-        if ROADMAPS.named(roadmap).seeded:
+        if _takes_seed(roadmap):
             options.setdefault("seed", seed)
         max_turn_rad = max_turning(friction, max_tension_ratio)
         with until_interrupt(clock) as rest:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from netsp.base.deprecated import deprecated_names
 from netsp.base.errors import InputError
+from netsp.base.registry import Registry, foreign, later
+from netsp.base.validated import shown
 from netsp.exchange.maps.chart_reader import is_chart, read_chart
 from netsp.exchange.maps.drawing import read_dxf
 from netsp.exchange.maps.feature import Map
@@ -31,6 +34,9 @@ EARTH_READERS = {
     ".ral": read_rally_list,
 }
 """Readers of formats that are always in degrees, by extension."""
+
+MAP_READERS: Registry[Callable[[str], Map]] = Registry("map reader", "netsp.maps", {}, later)
+"""Readers of other packages by extension without the dot, each called with a path."""
 
 
 def read_map(
@@ -73,9 +79,21 @@ def read_map(
         found = read_geojson(file, crs, policy.read)
     elif suffix in SEQUENCE_SUFFIXES:
         found = read_geojson_sequence(file, crs, policy.read)
+    elif suffix[1:] in MAP_READERS:
+        found = _read_by_plugin(file, suffix[1:])
     else:
         return read_vector(file, crs, policy.read)
     return found if crs is None else in_degrees(found, crs, file)
+
+
+def _read_by_plugin(file: str | Path, extension: str) -> Map:
+    """Return the map that a reader of another package makes of a file."""
+    what = f"{file}: reader of .{extension}"
+    with foreign(f"{what} failed"):
+        found = MAP_READERS[extension](str(file))
+    if not isinstance(found, Map):
+        raise InputError(f"{what}: expected a Map from it, got {shown(found)}")
+    return found
 
 
 __getattr__ = deprecated_names(

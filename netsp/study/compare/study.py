@@ -71,10 +71,12 @@ class StudyRoadmap(Model):
 
     @model_validator(mode="after")
     def _known(self) -> Self:
-        if self.name not in ROADMAPS:
+        try:
+            ROADMAPS.named(self.name)
+        except InputError as error:
             raise ValueError(
-                f"name: unknown roadmap {self.name!r}; expected one of {_list(ROADMAPS)}"
-            )
+                f"name: {str(error).replace('roadmap: unknown', 'unknown roadmap')}"
+            ) from None
         return self
 
 

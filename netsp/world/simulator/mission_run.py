@@ -35,7 +35,7 @@ from netsp.world.simulator.summary import summarise
 from netsp.world.simulator.surprises import SceneSurprises
 from netsp.world.simulator.surroundings import Surroundings
 from netsp.world.tether import GeodesicTether, make_tether
-from netsp.world.vehicle import make_vehicle
+from netsp.world.vehicle import VehicleFactory, make_vehicle
 from netsp.world.vehicle.kinematic import wrapped_angle
 
 
@@ -84,7 +84,7 @@ def simulate(
     mission: Mission,
     planner: str | Callable[..., Planner] = "predictive",
     *,
-    vehicle: str = "kinematic",
+    vehicle: str | VehicleFactory = "kinematic",
     tether: str | Callable[[DistanceField, float], Any] = "geodesic",
     options: PlannerOptions | None = None,
     scene: Scene | None = None,
@@ -102,8 +102,9 @@ def simulate(
     planner : str or callable
         Name (`netsp.world.planner.PLANNERS`) or factory of a planner, such as a class derived from
         `Planner`.
-    vehicle : str
-        Name of a vehicle (`netsp.world.vehicle.VEHICLES`).
+    vehicle : str or callable
+        Name of a vehicle (`netsp.world.vehicle.VEHICLES`), or factory that is called with a place
+        and a speed.
     tether : str or callable
         The planner's tether model: `geodesic`, `react`, or a callable that makes a
         `netsp.world.tether.TetherModel` of a field and a resolution. The log has the geodesic one.

@@ -17,21 +17,25 @@ def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:
     return BlueRov2(place, speed)
 
 
-VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Registry(
+VehicleFactory = Callable[[npt.NDArray[np.float64], float], Vehicle]
+
+VEHICLES: Registry[VehicleFactory] = Registry(
     "vehicle", "netsp.vehicles", {"kinematic": KinematicVehicle, "bluerov2": _bluerov2}, later
 )
 """Factories of vehicles by name, each called with a place (3,) and a speed."""
 
 
-def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Vehicle:
-    """Make a vehicle by name, at rest at a place (3,), for a speed in m/s.
+def make_vehicle(
+    vehicle: str | VehicleFactory, place: npt.NDArray[np.float64], speed: float
+) -> Vehicle:
+    """Make a vehicle by name or by calling a factory, at rest at a place (3,), for a speed in m/s.
 
     Raises
     ------
     InputError
         No vehicle has that name.
     """
-    return VEHICLES.named(name)(place, speed)
+    return (vehicle if callable(vehicle) else VEHICLES.named(vehicle))(place, speed)
 
 
-__all__ = ["VEHICLES", "KinematicVehicle", "Vehicle", "make_vehicle"]
+__all__ = ["VEHICLES", "KinematicVehicle", "Vehicle", "VehicleFactory", "make_vehicle"]
