@@ -121,8 +121,8 @@ def test_the_site_has_every_page_every_public_name_and_every_field():
     errors = vars(importlib.import_module("netsp.base.errors"))
     for name in netsp.__all__:
         assert re.search(rf"^::: netsp[\w.]*\.{name}$", reference, re.M) or name in errors, name
-    hooks = runpy.run_path(str(ROOT / "docs" / "hooks" / "pages.py"))
-    shown = "\n".join(hooks["formats"]())
+    hook = runpy.run_path(str(ROOT / "docs" / "hooks" / "format_reference.py"))
+    shown = "\n".join(hook["sections"]())
     for model in (Problem, Solution, Mission):
         assert all(f"| `{field}` |" in shown for field in model.model_fields)
 

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "netsp"
 KNOWN = ROOT / "problems" / "known"
 
-ENDS_AT_ONCE = {"schema", "completion"}
+ENDS_AT_ONCE = {"schema", "completion", "cite"}
 """Commands that print a text which is at hand."""
 
 

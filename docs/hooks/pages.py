@@ -1,14 +1,13 @@
-"""What the site has that no page of `docs/` holds: the file formats, from their JSON Schemas, the
-pages beside the shipped problems and scenes, and the notebooks, run while the site is built."""
+"""Pages of the site that are made while it is built: generated references, pages that lie beside
+shipped problems and scenes, and notebooks, which are run."""
 
 from __future__ import annotations
 
-import importlib
 import posixpath
 import re
-import runpy
+import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import nbformat
 from mkdocs.config.defaults import MkDocsConfig
@@ -20,12 +19,26 @@ from nbconvert.preprocessors import ExecutePreprocessor
 ROOT = Path(__file__).parents[2]
 BESIDE = {"reference/problems.md": "problems/README.md", "reference/scenes.md": "scenes/README.md"}
 EXAMPLES = ROOT / "examples"
-FORMATS, LICENCES = "<!-- formats -->", "<!-- licences -->"
-MODULES, TOLERANCES = "<!-- modules -->", "<!-- tolerances -->"
+sys.path.insert(0, str(Path(__file__).parent))  # hooks are loaded as single files
+
+import command_reference  # noqa: E402
+import format_reference  # noqa: E402
+import licences  # noqa: E402
+import modules  # noqa: E402
+
+GENERATED: dict[str, Callable[[], list[str]]] = {
+    "<!-- commands -->": command_reference.sections,
+    "<!-- commands contents -->": command_reference.contents,
+    "<!-- formats -->": format_reference.sections,
+    "<!-- licences -->": licences.table,
+    "<!-- modules -->": modules.module_list,
+    "<!-- tolerances -->": modules.tolerances,
+}
+"""Markers in pages, and the functions whose lines replace them."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Pages that lie beside what they are about."""
+    """Add the pages that lie beside their subjects, and the notebooks."""
     for name, source in BESIDE.items():
         text = linked_from(name, (ROOT / source).read_text(), Path(source).parent)
         files.append(File.generated(config, name, content=text))
@@ -36,7 +49,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def run(notebook: Path) -> dict[str, str | bytes]:
-    """A notebook as a page with what its cells print, and its pictures."""
+    """Return a notebook as a page with the output of its cells, and its pictures."""
     book = nbformat.read(notebook, as_version=4)
     ExecutePreprocessor(timeout=120, extra_arguments=["--log-level=40"]).preprocess(
         book, {"metadata": {"path": str(EXAMPLES)}}
@@ -78,84 +91,11 @@ def linked_from(page: str, markdown: str, folder: Path) -> str:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Links to those pages, and the formats where they belong."""
+    """Return the text of a page with its links mended and its markers replaced."""
     if page.file.generated_by is None:
         here = page.file.src_uri
         markdown = linked_from(here, markdown, Path("docs") / posixpath.dirname(here))
-    if FORMATS in markdown:
-        markdown = markdown.replace(FORMATS, "\n".join(formats()))
-    if LICENCES in markdown:
-        hook = runpy.run_path(str(Path(__file__).with_name("licences.py")))
-        markdown = markdown.replace(LICENCES, "\n".join(hook["table"]()))
-    if MODULES in markdown:
-        hook = runpy.run_path(str(Path(__file__).with_name("modules.py")))
-        markdown = markdown.replace(MODULES, "\n".join(hook["module_list"]()))
-        markdown = markdown.replace(TOLERANCES, "\n".join(hook["tolerances"]()))
+    for marker, lines in GENERATED.items():
+        if marker in markdown:
+            markdown = markdown.replace(marker, "\n".join(lines()))
     return markdown
-
-
-def formats() -> list[str]:
-    """A section for every format, and in it a table for every kind of object."""
-    from netsp.command.schema import FORMATS as MODELS
-
-    out = []
-    for name, place in MODELS.items():
-        module, model = place.split(":")
-        schema = getattr(importlib.import_module(module), model).model_json_schema()
-        out += [f"## {name.capitalize().replace('-', ' ')}", "", told(schema), ""]
-        out += table(name, schema)
-        for part, fields in schema.get("$defs", {}).items():
-            if fields.get("properties"):
-                out += [f"### {part} {{ #{name}-{part.lower()} }}", "", told(fields), ""]
-                out += table(name, fields)
-    return out
-
-
-def told(schema: dict[str, Any]) -> str:
-    """The first paragraph of a description."""
-    return schema.get("description", "").split("\n\n")[0].replace("\n", " ")
-
-
-def table(name: str, schema: dict[str, Any]) -> list[str]:
-    """A row for each field."""
-    required = set(schema.get("required", ()))
-    out = ["| field | type | meaning | default |", "|---|---|---|---|"]
-    for field, what in schema["properties"].items():
-        # a model in Python has it by itself, a file must say it
-        in_file = field in required or field == "schema_version"
-        default = "required" if in_file else f"`{what.get('default', 'none')}`"
-        if what.get("default", "") is None:
-            default = ""
-        meaning = what.get("description", "").replace("\n", " ").replace("|", "\\|")
-        out.append(f"| `{field}` | {kind(name, what)} | {meaning} | {default} |")
-    return [*out, ""]
-
-
-def kind(name: str, what: dict[str, Any]) -> str:
-    """A field's type in a few words."""
-    if "$ref" in what:
-        part = what["$ref"].rsplit("/", 1)[-1]
-        return f"[{part}](#{name}-{part.lower()})"
-    for several in ("anyOf", "oneOf"):
-        if several in what:
-            kinds = [kind(name, w) for w in what[several] if w.get("type") != "null"]
-            return " or ".join(dict.fromkeys(kinds))
-    if "enum" in what:
-        return ", ".join(f"`{v}`" for v in what["enum"])
-    if "const" in what:
-        return f"`{what['const']}`"
-    if what.get("type") == "array":
-        if "prefixItems" in what:
-            return f"({', '.join(kind(name, w) for w in what['prefixItems'])})"
-        size = what.get("maxItems")
-        count = f"{size} " if size is not None and size == what.get("minItems") else ""
-        return f"list of {count}{kind(name, what.get('items', {}))}"
-    return limits(what, what.get("type", "any"))
-
-
-def limits(what: dict[str, Any], type_: str) -> str:
-    """A number with the limits that it has."""
-    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-    signs |= {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-    told = [f"{sign} {what[key]:g}" for key, sign in signs.items() if key in what]
-    return " ".join([type_, ", ".join(told)]).strip()

@@ -263,12 +263,12 @@ def given_params(args: argparse.Namespace) -> dict[str, str]:
 
 
 PROBLEM = Input("PROBLEM", "problem file (JSON)")
-QUIET = Option("--quiet", "no progress, no summary")
-SILENT = Option("--quiet", "no progress")
+QUIET = Option("--quiet", "print no progress and no summary")
+SILENT = Option("--quiet", "print no progress")
 JSON = Option("--json", "print the summary as JSON on stdout (data then needs -o FILE)")
 PARAMS = Option(
     "--option NAME=VALUE",
-    "an option of the solver, as docs/reference/solvers.md lists them; may be repeated",
+    "option of the solver (docs/reference/solvers.md); may be repeated",
     option,
     repeats=True,
 )
@@ -278,15 +278,12 @@ ITERATION_LIMIT = Option(
 CLEARANCE = (
     Option(
         "--position-error M",
-        "error of the vehicle's position (m): the clearance should be larger",
+        "error of the vehicle's position (m), to check the clearance against",
         length,
         0.0,
     ),
     Option(
-        "--current V",
-        "speed of the current (m/s), which pushes the vehicle off its path",
-        length,
-        0.0,
+        "--current V", "speed of the current (m/s), to check the clearance against", length, 0.0
     ),
 )
 """Facts about the vehicle and the water that the clearance of a plan is compared with."""
@@ -298,7 +295,7 @@ LINK = Option(
 )
 VEHICLE_FRAMES = "local (metres north, east, down of the base) or global"
 RUN_FOLDER = Option("-o, --output RUN", "folder for logs, summary and run.png")
-SAMPLES = Option("--samples N", "prm: milestones; default 1000", positive)
+SAMPLES = Option("--samples N", "prm: number of milestones; default 1000", positive)
 
 
 def time_limit(text: str, default: float | None = None) -> Option:

@@ -85,7 +85,7 @@ FOR_ALL = (
     SEED,
     Data(
         "-o, --output FILE",
-        "write the solution (the planned mission) to this file (default: stdout)",
+        "write the solution, or the planned mission, to this file (default: stdout)",
     ),
     Picture("--plot FILE", "draw the solution (png, svg or pdf)"),
     *CLEARANCE,
@@ -108,7 +108,12 @@ FOR_PROBLEMS = (
         "--keep-order",
         "visit the goals in the order of the file; only their homotopy classes are chosen",
     ),
-    Option("--slack S", "share of the taut length that must fit beyond it, as 0.05", length, 0.0),
+    Option(
+        "--slack S",
+        "slack tether that must fit in addition, as a share of the taut length, such as 0.05",
+        length,
+        0.0,
+    ),
     friction("coefficient of friction of tether on obstacle, 0 to 10"),
     Option(
         "--max-tension-ratio K",
@@ -117,13 +122,13 @@ FOR_PROBLEMS = (
     ),
     Option(
         "--margin R",
-        "plan so that every obstacle may be off by R; default 0 (docs/guide/tether-and-station.md)",
+        "plan so that every obstacle may be off by R (docs/guide/tether-and-station.md)",
         length,
         0.0,
     ),
     Input(
         "--warm-start SOLUTION",
-        "start from this solution's tour, also one of an older version of the problem",
+        "start from this solution's tour; it may be of an older version of the problem",
     ),
     Picture(
         "--plot-trace FILE",
@@ -143,18 +148,21 @@ APP = Command(
     "netsp app problems/wharf.json",
     Option(
         "[PROBLEM]",
-        "problem file (JSON), made if there is none, or a map of a site "
-        "(docs/guide/bring-your-site-in.md); default: an empty map without a file; with --show "
-        "a solution file, or the folder of a run",
+        "problem file (JSON), created if it does not exist, or a map of a site "
+        "(docs/guide/bring-your-site-in.md); with --show a solution file or the folder of a run; "
+        "default: an empty map",
     ),
     Option(
         "--show",
-        "only look: at a solution (with --problem), or a run of `netsp execute` or `simulate`",
+        "view a solution (with --problem), or a run of `netsp execute` or `simulate`, without "
+        "editing",
     ),
-    Option("--problem FILE", "with --show: the problem of a solution file", dest="problem_file"),
+    Option(
+        "--problem FILE", "with --show: the problem that the solution solves", dest="problem_file"
+    ),
     Option("--port N", "port to listen on; default: a free one", int, 0),
-    Option("--time-limit S", "seconds of solving for each version", positive, 60),
-    Option("--no-browser", "only print the address"),
+    Option("--time-limit S", "seconds of solving after each edit", positive, 60),
+    Option("--no-browser", "print the address, and open no browser"),
 )
 
 COVER = Command(
@@ -173,17 +181,31 @@ COVER = Command(
         "2,70,90",
         default="2",
     ),
-    Option("--patch S", "edge of the patches of surface that are counted (m)", length, 0.2),
-    Option("--clearance R", "kept from all solids (m)", length, 0.3),
-    Option("--share S", "to be seen of what can be seen at all", length, 0.99),
+    Option("--patch S", "side of the surface patches whose visibility is counted (m)", length, 0.2),
+    Option("--clearance R", "distance to keep from all solids (m)", length, 0.3),
     Option(
-        "--incidence DEG", "most that a line of sight may be off the normal (degrees)", length, 75.0
+        "--share S",
+        "share of the visible surface that the waypoints must see, 0 to 1",
+        length,
+        0.99,
     ),
-    Option("--farthest D", "most that a patch may be away (m); default the camera's range", length),
     Option(
-        "--inspect NAME", "only this solid (or mesh, cloud, floor); may be repeated", repeats=True
+        "--incidence DEG",
+        "largest angle between a line of sight and the normal of the surface (degrees)",
+        length,
+        75.0,
     ),
-    time_limit("seconds for all", 60.0),
+    Option(
+        "--farthest D",
+        "largest distance from the camera to a patch (m); default the camera's range",
+        length,
+    ),
+    Option(
+        "--inspect NAME",
+        "cover only this solid (or mesh, cloud, floor); may be repeated",
+        repeats=True,
+    ),
+    time_limit("seconds for the whole command", 60.0),
     SEED,
     Data("-o, --output FILE", "write the mission to this file (default: stdout)"),
     Picture("--plot FILE", "draw the waypoints (png, svg or pdf)"),
@@ -203,14 +225,14 @@ VERIFY = Command(
         "print measures of entanglement; SOLUTION may then be any path (a file that netsp "
         "compare-path reads, or a JSON list of points)",
     ),
-    Option("--margins", "print how far the world may be off, too (netsp margins)"),
+    Option("--margins", "also print how far the world may be off, as netsp margins does"),
     frame("frame of a path to measure: local (the problem's plane) or global (degrees)"),
     Option(
         "--system N",
         "the vehicle's system id in a .tlog to measure; default: the only one with positions",
         natural,
     ),
-    Option("--quiet", "exit code only"),
+    Option("--quiet", "print nothing; the exit code is the answer"),
     Option("--json", "print the summary as JSON on stdout"),
 )
 
@@ -257,27 +279,33 @@ ANIMATE = Command(
     Output(
         "-o, --output FILE", "gif, mp4 (extra video), or a page (html) with a slider", required=True
     ),
-    Option("--seconds N", "how long it is", positive, 12),
-    Option("--fps N", "", positive, 15),
+    Option("--seconds N", "duration of the picture", positive, 12),
+    Option("--fps N", "frames per second", positive, 15),
     SILENT,
 )
 
 BASE = Command(
     "find where to stand, among candidates for the base",
     "netsp base problems/wharf.json --grid 10,10 --plot base.png",
-    Input("PROBLEM", "problem file (JSON); its base does not count"),
+    Input("PROBLEM", "problem file (JSON); the base in it is ignored"),
     OneOf(
         (
-            Input("--candidates FILE", "table (CSV) with the columns x, y and perhaps z, name"),
-            Option("--line X1,Y1,X2,Y2,N", "N places along a line, as a quay"),
-            Option("--grid NX,NY", "a grid over the bounds, or over what the problem holds"),
+            Input(
+                "--candidates FILE",
+                "places from a table (CSV) with the columns x, y and optionally z, name",
+            ),
+            Option("--line X1,Y1,X2,Y2,N", "N places along a line, such as a quay"),
+            Option(
+                "--grid NX,NY",
+                "a grid of places over the bounds; without bounds, over goals and obstacles",
+            ),
         ),
         required=True,
     ),
-    Option("--every", "solve from every place, also those proven worse"),
-    Option("--top N", "places printed", positive, 10),
-    time_limit("seconds; the best known by then is written; default none"),
-    seed(""),
+    Option("--every", "also solve from places that are proven worse than the best"),
+    Option("--top N", "number of places to print", positive, 10),
+    time_limit("seconds; the best place found by then is written; default no limit"),
+    seed("random seed of the solver"),
     Output("-o, --output FILE", "write the ranking: a table (.csv) or JSON"),
     Output("--problem-output FILE", "write the problem with its base at the best place"),
     Picture("--plot FILE", "draw both maps (.png, .svg or .pdf)"),
@@ -290,11 +318,11 @@ TETHER = Command(
     PROBLEM,
     Option(
         "--longest L",
-        "longest tether to look at, in the problem's units; default: the problem's",
+        "longest tether to consider, in the problem's units; default: the problem's own",
         length,
     ),
-    time_limit("seconds; what is known by then is written; default none"),
-    seed(""),
+    time_limit("seconds; the part of the curve known by then is written; default no limit"),
+    seed("random seed of the solver"),
     Output("-o, --output FILE", "write the curve: a table (.csv) or JSON"),
     Picture("--plot FILE", "draw the curve (.png, .svg or .pdf)"),
     SILENT,
@@ -310,7 +338,7 @@ GTSP = Command(
         default="auto",
     ),
     PARAMS,
-    time_limit("seconds; the best tour by then is written; default no limit"),
+    time_limit("seconds; the best tour found by then is written; default no limit"),
     ITERATION_LIMIT,
     SEED,
     Data("-o, --output FILE", "write the tour, in TSPLIB's format, to this file (default: stdout)"),
@@ -331,15 +359,20 @@ WORLD = Command(
     Option("--goals N", "number of goals; default 20, rss2016: 5 to 10", positive),
     Option(
         "--obstacles N",
-        "number of obstacles, or a range such as 1-20 that it is drawn from; default 20, rss2016: "
-        "5 to 10",
+        "number of obstacles, or a range such as 1-20 to draw it from; default 20, rss2016: 5 to "
+        "10",
         count_or_range,
     ),
     Option("--tether L", "tether length", length, 300.0),
-    Option("--side L", "side of the square", length, 500.0),
-    Option("--radii R R", "minimum and maximum radius; default 10 30", length, (10.0, 30.0)),
+    Option("--side L", "side of the square world", length, 500.0),
+    Option(
+        "--radii R R",
+        "smallest and largest radius of obstacles; default 10 30",
+        length,
+        (10.0, 30.0),
+    ),
     Output("-o, --output FILE", "write the problem to this file (default: stdout)"),
-    Picture("--plot FILE", "draw it (png, svg or pdf)"),
+    Picture("--plot FILE", "draw the problem (png, svg or pdf)"),
 )
 
 SIMULATE = Command(
@@ -360,27 +393,30 @@ SIMULATE = Command(
     ),
     Option(
         "--tether-model NAME",
-        "used by the planner: geodesic (default) or react",
+        "tether model of the planner: geodesic (default) or react",
         default="geodesic",
         group="netsp.tethers",
     ),
     Option("--current X,Y,Z", "current (m/s), instead of the mission's"),
     Option(
         "--paths NAME",
-        "how paths are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
+        "path planner: tree (default), or bitstar, rrtstar or prmstar (OMPL)",
         default="tree",
     ),
-    Option("--refine NAME", "none, paper or gradient; default is the planner's own"),
+    Option(
+        "--refine NAME",
+        "refinement of paths: none, paper or gradient; default: as the planner says",
+    ),
     Option(
         "--perturbation {free,farther}",
-        "random moves that --refine paper keeps: free (default), as the paper says, or those that "
-        "lead farther from solids",
+        "random moves that --refine paper accepts: all free ones (default), as in the paper, or "
+        "only those that lead farther from solids",
         default="free",
     ),
     seed("random seed of gusts and of sampling planners"),
-    Option("--compare NAME", "also fly with this planner, for comparison"),
+    Option("--compare NAME", "also run this planner, for comparison"),
     surprises(
-        "solids that appear, vanish or move; waypoints added or cancelled; a robot carried off"
+        "solids that appear, vanish or move; waypoints added or cancelled; a robot pushed away"
     ),
     Option("--snap", "move waypoints out of solids"),
     Option(
@@ -404,8 +440,8 @@ EXECUTE = Command(
     Option("--gusts S", "gusts added to the current (m/s)", length),
     Option(
         "--planner NAME",
-        "repair (default), or none: keep to the plan whatever happens; in space, find a way to one "
-        "waypoint after the other",
+        "repair (default), or none: keep to the plan whatever happens; in space, find a path to "
+        "one waypoint after the other",
         default="repair",
     ),
     Option(
@@ -468,28 +504,23 @@ FLY = Command(
         length,
         0.5,
     ),
-    Option("--reach R", "a vertex or goal this near is reached, m", length, 0.3),
-    Option(
-        "--pace F",
-        "seconds of the vehicle for each of ours: 1, but in simulations that run faster",
-        length,
-        1.0,
-        shows_default=False,
-    ),
+    Option("--reach R", "distance at which a vertex or goal counts as reached, m", length, 0.3),
+    Option("--pace F", "simulation speed-up; 1 for a real vehicle", length, 1.0),
     Option(
         "--at-end {hold,position-hold,surface,leave}",
-        "after the flight: hold the place in GUIDED, in POSHOLD, or come to the surface, until "
-        "another ground station is heard or Ctrl-C; or leave the vehicle; default hold",
+        "after the flight: hold the position in GUIDED (hold) or POSHOLD (position-hold), or come "
+        "to the surface, until another ground station is heard or Ctrl-C; or leave the vehicle as "
+        "it is; default hold",
         default="hold",
     ),
-    surprises("events on the way"),
+    surprises("events during the flight"),
     Option(
-        "--events", 'take events from standard input, a JSON object a line: {"cancel_goal": "A3"}'
+        "--events", 'read events from standard input, one JSON object a line: {"cancel_goal": "A3"}'
     ),
-    page("serve a page on this machine, which takes events too"),
+    page("serve a page on this computer that shows the flight and accepts events"),
     Option(
         "--planning-limit S",
-        "seconds that a repair may take, while the vehicle holds its place; default 2",
+        "seconds that a repair may take, while the vehicle holds its position; default 2",
         seconds,
     ),
     Option(
@@ -498,7 +529,7 @@ FLY = Command(
         "limit",
         length,
     ),
-    seed("of solvers"),
+    seed("random seed of solvers"),
     RUN_FOLDER,
     *CLEARANCE,
     QUIET,
@@ -510,8 +541,8 @@ GUARD = Command(
     "netsp guard problems/wharf.json --link udpin:14550 --page",
     Input(
         "SITE",
-        "problem file or mission file (JSON); one of a planned mission also tells whether the "
-        "tether is as planned",
+        "problem file or mission file (JSON); with a planned mission, the guard also says whether "
+        "the tether is as planned",
     ),
     Group(
         "where it listens; the vehicle is never commanded to move",
@@ -530,17 +561,16 @@ GUARD = Command(
     Group(
         "what is known of the vehicle",
         (
-            Option("--noise M", "standard deviation of one position, m", length, 0.3),
+            Option("--noise M", "standard deviation of single positions, m", length, 0.3),
             Option(
-                "--drift M",
-                "standard deviation of how far positions are off for minutes, m",
-                length,
-                0.5,
+                "--drift M", "standard deviation of the slow drift of positions, m", length, 0.5
             ),
-            Option("--speed V", "fastest speed, m/s", length, 0.5),
+            Option("--speed V", "maximum speed of the vehicle, m/s", length, 0.5),
         ),
     ),
-    Output("--state FILE", "keep the class here, and go on from it when started again"),
+    Output(
+        "--state FILE", "save the tether's class to this file, and continue from it after a restart"
+    ),
     Option(
         "--publish", "send tether, slack and alarms to the link (NAMED_VALUE_FLOAT, STATUSTEXT)"
     ),
@@ -548,7 +578,7 @@ GUARD = Command(
         "--ask-rates",
         "ask the vehicle to send its position ten times a second (SET_MESSAGE_INTERVAL)",
     ),
-    page("serve a page on this machine"),
+    page("serve a page on this computer"),
     Output(
         "-o, --output FILE",
         "write every report as a line of JSON to this file; - is standard output",
@@ -573,16 +603,16 @@ EXPORT = Command(
     ),
     Option(
         "--acceptance R",
-        "acceptance radius of the vehicle (m), within which it cuts corners",
+        "acceptance radius of the vehicle (m), within which it may cut corners",
         length,
         0.0,
     ),
     Option(
         "--hold S",
-        "seconds to hold at every goal; default 5, of a mission what its waypoints ask for",
+        "seconds to hold at every goal; default 5, for a mission what its waypoints ask for",
         natural,
     ),
-    Option("--speed V", "speed, m/s; default 0.5, or a mission's own", length),
+    Option("--speed V", "cruise speed, m/s; default 0.5, for a mission its own", length),
     Option("--max-waypoints N", "maximum number of waypoints", positive, 650),
     Option(
         "--fence-bytes N",
@@ -598,8 +628,10 @@ EXPORT = Command(
     ),
     *CLEARANCE,
     Option("--depth D", "depth of all goals of a solution (m), instead of their own", depth),
-    Option("--surface Z", "of a mission: z of the water's surface (m)", float, 0.0),
-    Data("-o, --output FILE", None, required=True),
+    Option("--surface Z", "mission: z of the water's surface (m)", float, 0.0),
+    Data(
+        "-o, --output FILE", "write the mission to this file; - is standard output", required=True
+    ),
     JSON,
 )
 
@@ -610,17 +642,17 @@ CHARTS = (
         depth,
     ),
     Output("--floor FILE", "write the sea floor of the chart's depths (.asc, .tif), for scenes"),
-    Option("--floor-cell C", "size of its cells (m); default: 256 along a side", length),
+    Option("--floor-cell C", "size of the floor's cells (m); default: 256 along a side", length),
 )
 
 IMAGES = (
-    Option("--resolution R", "size of a cell (m), of an image without YAML", length),
+    Option("--resolution R", "size of a cell (m), for an image without a YAML file", length),
     Option(
         "--tolerance T",
         "how far obstacles may go beyond occupied cells (m); default: a cell",
         length,
     ),
-    Option("--unknown-free", "take cells that the map does not know as free, not as obstacles"),
+    Option("--unknown-free", "treat unknown cells as free, not as obstacles"),
 )
 
 IMPORT = Command(
@@ -633,8 +665,8 @@ IMPORT = Command(
     ),
     Option(
         "--base LAT,LON[,HEADING]",
-        "position of the base, and compass heading of the y axis; default: from the file; X,Y (m) "
-        "in an occupancy image",
+        "position of the base, and compass heading of the y axis; in an occupancy image X,Y (m); "
+        "default: from the file",
     ),
     Option("--tether L", "tether length (m); default: from the file", length),
     Option("--clearance C", "clearance from obstacles (m); default: from the file, or 0", length),
@@ -670,32 +702,35 @@ IMPORT = Command(
         "leave out obstacles beyond the reach of the tether; default: in charts only",
     ),
     Option("--inspect N", "N goals about every obstacle, at every depth", positive),
-    Option("--standoff S", "distance (m) of those goals from its surface", length),
+    Option(
+        "--standoff S", "distance (m) of the goals of --inspect from the obstacle's surface", length
+    ),
     Option(
         "--of WORD=VALUE",
-        "inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
+        "inspect only these obstacles: layer=NAME, name=NAME (with * and ?), "
         "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); repeat a word for "
         "alternatives, different words must all match",
         option,
         repeats=True,
     ),
-    Option("--depths D[,D…]", "depths (m) of those goals; default 0", default="0"),
+    Option("--depths D[,D…]", "depths (m) of the goals of --inspect; default 0", default="0"),
     Option("--depth D", "depth of all goals (m), instead of their own", depth),
     Option(
         "--skip-unreachable", "leave out goals that the tether cannot reach, and say which and why"
     ),
     Input(
         "--goals TABLE",
-        "more goals: CSV with the columns x, y (m) or lat, lon, and perhaps z or depth, name",
+        "add goals from a CSV file with the columns x, y (m) or lat, lon, and optionally z or "
+        "depth, name",
     ),
     Input(
         "--candidates TABLE",
-        "places where the base may stand (columns as for --goals); a cropped map keeps the reach "
-        "from each of them",
+        "places where the base may stand (columns as for --goals); cropping keeps all that is in "
+        "reach of any of them",
     ),
     Group("charts", CHARTS),
     Group("occupancy images", IMAGES),
-    Output("--plot FILE", "draw the problem, what was left out dashed: PNG, SVG or PDF"),
+    Output("--plot FILE", "draw the problem, with what was left out dashed (png, svg or pdf)"),
     Data("-o, --output FILE", "write the problem to this file (default: stdout)"),
     JSON,
     module="import_site",
@@ -720,7 +755,7 @@ COMPARE = Command(
     time_limit("seconds per trial; default 120"),
     Option("--memory-limit GIB", "GiB per trial; default no limit", length),
     Option("--jobs N", "number of worker processes", positive, 1),
-    Option("--shard I/N", "only the I-th of N parts", shard, (1, 1)),
+    Option("--shard I/N", "run only part I of N; default 1/1", shard, (1, 1)),
     Option("--scheduler ADDRESS", "run on the Dask cluster at tcp://host:port"),
     QUIET,
     JSON,
@@ -738,7 +773,7 @@ COMPARE_PATH = Command(
         "recorded flight (.csv.gz, .tlog, .bin) or a solution",
         dest="paths",
     ),
-    Input("--solution FILE", "the planned tour; default: solved on the spot"),
+    Input("--solution FILE", "the planned tour; default: solve the problem now"),
     Option(
         "--radius R",
         "distance at which a goal counts as visited, in the problem's units; default 2 %% of the "
@@ -783,11 +818,15 @@ LIBRARY = Command(
     ),
     Option("[FILE...]", "check: solution files (JSON)", dest="files"),
     Option(
-        "--folder DIR", "where the library is; default problems/library", default="problems/library"
+        "--folder DIR",
+        "folder of the library; default problems/library",
+        default="problems/library",
     ),
-    Option("--only PATTERN", "list, rank: only problems named so", default="*"),
+    Option(
+        "--only PATTERN", "list, rank: only problems whose names match; default all", default="*"
+    ),
     Option("--keep", "check: write better tours to the records"),
-    Option("--by NAME", "check: who found them", default="a contributor"),
+    Option("--by NAME", "check: name of the finder, for the records", default="a contributor"),
     OneOf(
         (
             Option(
@@ -800,12 +839,12 @@ LIBRARY = Command(
             ),
         )
     ),
-    Option("--label NAME", "rank: what the solver is called"),
+    Option("--label NAME", "rank: name of the solver in tables; default: as given"),
     time_limit("rank: seconds for each problem", 10.0),
     SEED,
     Option(
         "-o, --output FILE",
-        "rank: file of rows; those that are there are ranked, too, and not run again",
+        "rank: file of rows; rows that it already holds are ranked and not run again",
     ),
     SILENT,
     Option("--json", "print the answer as JSON on stdout"),
@@ -835,9 +874,15 @@ SCHEMA = Command(
     "netsp schema problem > problem.schema.json",
     Option(
         "{problem,solution,scene,mission,surprises,run-state,scene-surprises,study}",
-        "of a file that netsp reads or writes",
+        "format of a file that netsp reads or writes",
         dest="format",
     ),
+)
+
+CITE = Command(
+    "print how to cite netsp and the problem that it solves",
+    "netsp cite --format bibtex",
+    Option("--format {text,bibtex}", "text (default) or entries for BibTeX", default="text"),
 )
 
 WARM_UP = Command(
@@ -857,7 +902,7 @@ WARM_UP = Command(
 COMPLETION = Command(
     "print what a shell needs to complete netsp's commands",
     "netsp completion bash > ~/.local/share/bash-completion/completions/netsp",
-    Option("{bash,zsh,tcsh}", "that is to complete", dest="shell"),
+    Option("{bash,zsh,tcsh}", "shell to generate completion for", dest="shell"),
 )
 
 COMMANDS = {
@@ -889,6 +934,6 @@ COMMANDS = {
         "combine": COMBINE,
         "report": REPORT,
     },
-    "tools": {"schema": SCHEMA, "warm-up": WARM_UP, "completion": COMPLETION},
+    "tools": {"schema": SCHEMA, "cite": CITE, "warm-up": WARM_UP, "completion": COMPLETION},
 }
 """Commands by what they are for, and by name."""
