@@ -13,6 +13,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import textwrap
 import time
 import tomllib
 from collections.abc import Iterator
@@ -34,7 +35,8 @@ NOT_RUN = {
 }
 """First words of commands that are not run, with what they need."""
 
-_FENCE = re.compile(r"^```(\w*)\n(.*?)^```", re.S | re.M)
+_FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```", re.S | re.M)
+"""A block of code, which may be indented as a part of a numbered step."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def blocks(page: str) -> Iterator[Block]:
     """The runnable blocks of a page; those of no language count when they begin with a command."""
     text = (ROOT / page).read_text(encoding="utf-8")
     for found in _FENCE.finditer(text):
-        kind, body = found[1], found[2]
+        kind, body = found[2], textwrap.dedent(found[3])
         line = text.count("\n", 0, found.start()) + 1
         if kind == "python":
             yield Block(page, line, "python", body)

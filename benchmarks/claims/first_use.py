@@ -16,7 +16,7 @@ WORLDS_PER_GOAL_COUNT = 2
 
 
 def within(use: FirstUse) -> tuple[str, bool]:
-    """Measure one run. Its limit has no allowance: docs/guide/install promises it to users."""
+    """Measure one run. Its limit has no allowance: docs/notebook/install.md states it."""
     spent = use.cpu_s()
     return f"{spent:.1f} s CPU", spent <= use.max_cpu_s
 

@@ -1,4 +1,4 @@
-"""Contract of docs/guide/bring-your-site-in.md: the kind of each feature of a map.
+"""Contract of docs/reference/maps.md: the kind of each feature of a map.
 
 The first rule that matches decides: the user's `--map`, a property `kind`, the layer's name, object
 classes of charts or tags of OpenStreetMap, the shape.

@@ -1,4 +1,4 @@
-"""Import of a problem from a map, by the contract of docs/guide/bring-your-site-in.md.
+"""Import of a problem from a map, by the contract of docs/reference/maps.md.
 
 All complaints are collected and raised together. Every feature of the map ends in the ledger: used
 as one kind, or left out for a reason.

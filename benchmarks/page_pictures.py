@@ -1,0 +1,193 @@
+"""Make the pictures of the pages.
+
+    python benchmarks/page_pictures.py [NAME …]   # default: all, into docs/pictures
+
+Each function of `PICTURES` makes one picture and has its name. Pictures of the app need playwright
+and a Chromium browser on the path.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parent.parent
+
+WINDOW: Any = {"width": 1100, "height": 700}  # of the browser, px
+
+COLOURS = 128  # of a picture's palette: fewer show in the shades of the app, more only cost space
+
+
+def save_small(picture: Path, target: Path) -> None:
+    """Write a picture as a PNG with a palette, which takes about a third of the space."""
+    image = Image.open(picture).convert("RGB")
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+def run_netsp(*words: str, folder: Path) -> None:
+    """Run a command of netsp in a folder; paths of shipped files start at the repository's root."""
+    shipped = ("problems/", "examples/", "scenes/", "missions/")
+    command = [str(ROOT / word) if word.startswith(shipped) else word for word in words]
+    subprocess.run([sys.executable, "-m", "netsp", *command], cwd=folder, check=True)
+
+
+@contextmanager
+def app_page(problem: str | None = None) -> Iterator[Any]:
+    """Open the app in a browser and yield its page (a `playwright.sync_api.Page`).
+
+    Parameters
+    ----------
+    problem : str, optional
+        Problem file to open, from the repository's root; the app gets a copy of it.
+    """
+    from playwright.sync_api import sync_playwright
+
+    browser_file = shutil.which("chromium") or shutil.which("chromium-browser")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        opened = [shutil.copy(ROOT / problem, folder)] if problem else []
+        command = [sys.executable, "-m", "netsp", "app", *opened, "--no-browser"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder) as server:
+            try:
+                lines = server.stderr or ()
+                url = next(found[0] for line in lines if (found := re.search(r"http\S+", line)))
+                browser = playwright.chromium.launch(
+                    executable_path=browser_file, args=["--no-sandbox"]
+                )
+                page = browser.new_page(viewport=WINDOW, bypass_csp=True)
+                page.goto(url)
+                page.wait_for_timeout(500)
+                yield page
+                browser.close()
+            finally:
+                server.terminate()
+
+
+def wait_for_tour(page: Any) -> None:
+    """Wait until the app shows a proven tour and its margins."""
+    page.wait_for_function("document.querySelector('#answer').textContent.includes('proven')")
+    page.wait_for_function("document.querySelector('#panel').textContent.includes('Margins')")
+
+
+def app(target: Path) -> None:
+    """The app with the wharf, its tour and the tether in the middle of it."""
+    with app_page("problems/wharf.json") as page:
+        wait_for_tour(page)
+        page.locator("#along").evaluate(
+            "e => { e.value = 400; e.dispatchEvent(new Event('input', { bubbles: true })); }"
+        )
+        page.mouse.move(400, 300)
+        page.wait_for_timeout(1500)
+        page.screenshot(path=target)
+
+
+def app_reach(target: Path) -> None:
+    """The wharf with a tether that is too short for two goals."""
+    with app_page("problems/wharf.json") as page:
+        wait_for_tour(page)
+        page.get_by_label("tether length (m)").fill("17")
+        page.keyboard.press("Enter")
+        page.wait_for_function("document.querySelector('#answer').textContent.includes('needs')")
+        page.wait_for_timeout(1500)
+        page.screenshot(path=target)
+
+
+def app_import(target: Path) -> None:
+    """The dialogue that asks for what a map lacks: here the base, and with it the tether length."""
+    site = json.loads((ROOT / "examples" / "site.geojson").read_text())
+    site["features"] = [f for f in site["features"] if f["properties"].get("kind") != "base"]
+    with app_page() as page, tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "pier.geojson"
+        file.write_text(json.dumps(site))
+        page.set_input_files("#file", file)
+        page.wait_for_selector("dialog", timeout=5000)
+        page.wait_for_timeout(500)
+        page.screenshot(path=target)
+
+
+def app_space(target: Path) -> None:
+    """The wharf with its tour in space."""
+    with app_page("problems/wharf.json") as page:
+        wait_for_tour(page)
+        page.locator("#map").focus()
+        page.keyboard.press("3")
+        page.wait_for_function("document.querySelector('#space').dataset.drawn === 'yes'")
+        page.locator("#along").evaluate(
+            "e => { e.value = 400; e.dispatchEvent(new Event('input', { bubbles: true })); }"
+        )
+        page.wait_for_timeout(2000)
+        page.screenshot(path=target)
+
+
+def wharf(target: Path) -> None:
+    """The wharf with its tour and the tether at each visit."""
+    run_netsp(
+        "solve", "problems/wharf.json", "-o", "tour.json", "--plot", str(target),
+        folder=target.parent,
+    )  # fmt: skip
+
+
+def import_site(target: Path) -> None:
+    """The problem made from the map `examples/site.geojson`."""
+    run_netsp(
+        "import", "examples/site.geojson", "-o", "site.json", "--plot", str(target),
+        folder=target.parent,
+    )  # fmt: skip
+
+
+def import_tank(target: Path) -> None:
+    """The problem made from the drawing `examples/tank.dxf`."""
+    run_netsp(
+        "import", "examples/tank.dxf", "--units", "mm", "--tether", "25", "--clearance", "0.2",
+        "-o", "tank.json", "--plot", str(target), folder=target.parent,
+    )  # fmt: skip
+
+
+def import_basin(target: Path) -> None:
+    """The problem made from the occupancy image `examples/basin.yaml`."""
+    run_netsp(
+        "import", "examples/basin.yaml", "--base", "6,8", "--goals", "examples/basin-goals.csv",
+        "--tether", "60", "--clearance", "0.3", "-o", "basin.json", "--plot", str(target),
+        folder=target.parent,
+    )  # fmt: skip
+
+
+PICTURES: tuple[Callable[[Path], None], ...] = (
+    app,
+    app_reach,
+    app_import,
+    app_space,
+    wharf,
+    import_site,
+    import_tank,
+    import_basin,
+)
+
+
+def main() -> None:
+    """Make the pictures that are named, or all."""
+    made = {function.__name__.replace("_", "-"): function for function in PICTURES}
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(made))
+    parser.add_argument("--folder", type=Path, default=ROOT / "docs" / "pictures")
+    args = parser.parse_args()
+    for name in args.names or made:
+        with tempfile.TemporaryDirectory() as folder:
+            raw = Path(folder) / f"{name}.png"
+            made[name](raw)
+            save_small(raw, args.folder / f"{name}.png")
+        print(f"{name}.png: {(args.folder / f'{name}.png').stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
