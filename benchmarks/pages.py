@@ -65,7 +65,7 @@ def blocks(page: str) -> Iterator[Block]:
 
 def commands(block: Block) -> Iterator[str]:
     """The commands of a block that are to be run, checking those that are not."""
-    for raw in block.text.splitlines():
+    for raw in block.text.replace("\\\n", " ").splitlines():
         command = raw.split(" #")[0].strip()
         if not command or command.startswith("#"):
             continue
