@@ -1,7 +1,8 @@
 """Every fenced command and Python snippet of README and docs, run exactly as written.
 
 A page runs in a temporary folder that holds the repository's own files and nothing else, its blocks
-from top to bottom, so that one may use what another has left. `make` would run this again, and
+from top to bottom, so that one may use what another has left. A snippet whose first line is the name
+of a module, as `# my_solver.py`, is saved under it before it runs. `make` would run this again, and
 packages cannot be installed everywhere: of those only what they name is looked up.
 """
 
@@ -34,6 +35,9 @@ NOT_RUN = {
     "source": "an environment of the reader's own",
 }
 """First words of commands that are not run, with what they need."""
+
+_FILE = re.compile(r"# (\w+\.py)\n")
+"""First line of a snippet that readers are to save as a module."""
 
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```", re.S | re.M)
 """A block of code, which may be indented as a part of a numbered step."""
@@ -96,6 +100,8 @@ def run_page(page: str, folder: Path) -> list[tuple[str, float]]:
     ran = []
     for block in blocks(page):
         if block.kind == "python":
+            if module := _FILE.match(block.text):
+                (folder / module[1]).write_text(block.text, encoding="utf-8")
             steps = [[sys.executable, "-c", block.text]]
         else:
             steps = [["sh", "-ec", command] for command in commands(block)]

@@ -7,9 +7,9 @@ to (j, h_j) is the shortest path of the class ``h_i^-1 h_j``, which is that of t
 base. So the reduced graph is the travel graph on the vertices of shortest tether, and its TSP is
 solved by `mip`, with equation (2) trivially satisfied.
 
-The paper reports tours within 5 % of the optimum. Its recipe alone does not reach that (figures in
-docs/notebook): the classes of shortest tether are too few to pass an obstacle on one side and
-come back on the other. So by default three classes are kept for every goal, and the classes along
+The paper reports tours within 5 % of the optimum. In worlds with many obstacles its recipe alone is
+farther off (docs/notebook/reproduction.md): the classes of shortest tether are too few to pass an
+obstacle on one side and come back on the other. So by default three classes are kept for every goal, and the classes along
 the order found are chosen again, exactly and from all, by a shortest path through layers.
 ``classes=1 polish=0`` is the paper's.
 """
