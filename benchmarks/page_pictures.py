@@ -162,6 +162,13 @@ def import_basin(target: Path) -> None:
     )  # fmt: skip
 
 
+def compare_solvers(target: Path) -> None:
+    """Lengths of two solvers' tours in the study `examples/study.toml`."""
+    run_netsp("compare", "examples/study.toml", "-o", "rows.jsonl", folder=target.parent)
+    run_netsp("report", "rows.jsonl", "-o", "rows.html", "--figures", "png", folder=target.parent)
+    (target.parent / "rows-length.png").rename(target)
+
+
 PICTURES: tuple[Callable[[Path], None], ...] = (
     app,
     app_reach,
@@ -171,6 +178,7 @@ PICTURES: tuple[Callable[[Path], None], ...] = (
     import_site,
     import_tank,
     import_basin,
+    compare_solvers,
 )
 
 

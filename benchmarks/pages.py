@@ -1,9 +1,9 @@
 """Every fenced command and Python snippet of README and docs, run exactly as written.
 
 A page runs in a temporary folder that holds the repository's own files and nothing else, its blocks
-from top to bottom, so that one may use what another has left. A snippet whose first line is the name
-of a module, as `# my_solver.py`, is saved under it before it runs. `make` would run this again, and
-packages cannot be installed everywhere: of those only what they name is looked up.
+from top to bottom, so that one may use what another has left. A snippet whose first line names a
+module, as `# my_solver.py`, is saved under that name before it runs. `make` would run this again,
+and packages cannot be installed everywhere: of those only what they name is looked up.
 """
 
 from __future__ import annotations

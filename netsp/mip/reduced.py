@@ -9,9 +9,9 @@ solved by `mip`, with equation (2) trivially satisfied.
 
 The paper reports tours within 5 % of the optimum. In worlds with many obstacles its recipe alone is
 farther off (docs/notebook/reproduction.md): the classes of shortest tether are too few to pass an
-obstacle on one side and come back on the other. So by default three classes are kept for every goal, and the classes along
-the order found are chosen again, exactly and from all, by a shortest path through layers.
-``classes=1 polish=0`` is the paper's.
+obstacle on one side and come back on the other. So by default three classes are kept for every
+goal, and the classes along the order found are chosen again, exactly and from all, by a shortest
+path through layers. ``classes=1 polish=0`` is the paper's.
 """
 
 from __future__ import annotations
