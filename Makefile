@@ -50,9 +50,11 @@ js:
 accept: $(VENV)/.warm
 	$(BIN)/python benchmarks/accept.py
 
-# the pages as a site, in build/site; a warning is an error
+# the pages as a site, in build/site, checked before and after; a warning is an error
 docs: $(VENV)/.installed
+	$(BIN)/python docs/hooks/check_pages.py
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	$(BIN)/python docs/hooks/check_site.py build/site
 
 # the wheel that a release would have, alone in a new environment, does the main job
 wheel: wheel-installed

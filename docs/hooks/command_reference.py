@@ -6,7 +6,7 @@ import argparse
 import posixpath
 import re
 
-from netsp.command.command_options import Group, OneOf, Option
+from netsp.command.command_options import Group, OneOf, Option, each_option
 from netsp.command.command_table import COMMANDS, Command
 
 DEFAULT = re.compile(r"^(.*?)[;,]? ?\(?\bdefault(?: is)?:? (?!\))([^()]*)\)?$")
@@ -117,8 +117,7 @@ def undocumented() -> list[str]:
         f"{name} {option.name}"
         for group in COMMANDS.values()
         for name, command in group.items()
-        for each in command.options
-        for option in ([each] if isinstance(each, Option) else each.options)
+        for option in each_option(command.options)
         if not (option.text or "").strip()
     ]
 

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from netsp.command.schema import FORMATS
+from netsp.command.schema import FORMATS, schema_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,7 +31,7 @@ def sections() -> list[str]:
     """Return Markdown: a section for every format, and in it a table for every kind of object."""
     out = []
     for name in FORMATS:
-        schema = model(name).model_json_schema()
+        schema = schema_of(name)
         out += [f"## {name.capitalize().replace('-', ' ')}", "", described(schema), ""]
         out += [*example(name), *table(name, schema)]
         for part, fields in schema.get("$defs", {}).items():
@@ -93,12 +93,20 @@ def table(name: str, schema: dict[str, Any]) -> list[str]:
     for field, what in schema["properties"].items():
         # a model in Python has it by itself, a file must say it
         in_file = field in required or field == "schema_version"
-        default = "required" if in_file else f"`{what.get('default', 'none')}`"
-        if what.get("default", "") is None:
-            default = ""
+        default = "required" if in_file else shown_default(what.get("default"))
         meaning = what.get("description", "").replace("\n", " ").replace("|", "\\|")
         out.append(f"| `{field}` | {kind(name, what)} | {meaning} | {default} |")
     return [*out, ""]
+
+
+def shown_default(value: Any) -> str:
+    """Return a default as a file has it; nothing for null, and no long objects."""
+    if value is None:
+        return ""
+    if isinstance(value, dict) and len(value) > 2:
+        return "its own defaults"
+    text = value if isinstance(value, str) and value else json.dumps(value, ensure_ascii=False)
+    return f"`{text}`"
 
 
 def kind(name: str, what: dict[str, Any]) -> str:

@@ -63,7 +63,17 @@ class NetspError(Exception):
 
 
 class InputError(NetspError):
-    """Input that cannot be used. The message is one line: field, value, what was expected."""
+    """Input that cannot be used. The message is one line: field, value, what was expected.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> try:
+    ...     Problem(base=(0, 0), goals=[(4, 0)], tether_length=-1)
+    ... except InputError as error:
+    ...     print(error, error.exit_code)
+    Problem: tether_length: expected a number > 0, got -1.0 2
+    """
 
     exit_code = EXIT_BAD_INPUT
 

@@ -39,6 +39,24 @@ class CostOracle(ABC):
     ----------
     cost_policy
         How costs are measured, and how long that takes.
+
+    Examples
+    --------
+    >>> class OnALine(CostOracle):
+    ...     places = np.array([0.0, 2.0, 5.0])
+    ...     def lengths(self, vertices, wanted=None, clock=None):
+    ...         costs = np.abs(np.subtract.outer(self.places[vertices], self.places[vertices]))
+    ...         np.fill_diagonal(costs, np.inf)
+    ...         return costs
+    ...     def to_base(self):
+    ...         return self.lengths(np.arange(3))[0]
+    ...     def lower_bounds(self, vertices, rows=None, clock=None):
+    ...         costs = self.lengths(vertices)
+    ...         return costs if rows is None else costs[rows]
+    >>> from netsp import solve_graph
+    >>> from netsp.gtsp.instance import Instance
+    >>> solve_graph(Instance([0, 1, 2], OnALine())).length
+    10.0
     """
 
     cost_policy = CostPolicy()

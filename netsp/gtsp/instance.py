@@ -81,6 +81,13 @@ class Instance:
         Distances between clusters by parity; None if they are not known.
     can_retrace : bool
         Whether legs are paths, so that a vehicle can go back along them.
+
+    Examples
+    --------
+    >>> from netsp import solve_graph
+    >>> instance = Instance.from_costs([[0, 2, 3], [2, 0, 2], [3, 2, 0]], clusters=[0, 1, 2])
+    >>> solve_graph(instance).length
+    7.0
     """
 
     bound_in_any_class = 0.0

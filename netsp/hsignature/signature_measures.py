@@ -69,7 +69,17 @@ def measure(
     problem: Problem, path: npt.ArrayLike, policy: MeasurePolicy = MeasurePolicy()
 ) -> Measures:
     """Return the measures of a polyline (k, 2) or (k, 3), in plan, among the obstacles of a
-    problem."""
+    problem.
+
+    Examples
+    --------
+    >>> from netsp import Circle, Problem
+    >>> problem = Problem(base=(0, 0), goals=[(4, 0)], tether_length=9,
+    ...                   obstacles=[Circle(center=(2, 0), radius=1)])
+    >>> measures = measure(problem, [(0, 0), (2, 2), (4, 0), (2, -2), (0, 0)])
+    >>> measures.entangled, measures.winding
+    ((0,), (-1,))
+    """
     xy = np.asarray(path, dtype=float)[:, :2]
     rays = problem.representative_points
     slack = policy.contact_depth * problem.scale

@@ -68,7 +68,16 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """Checks of a solution, in order; its truth value is `passed`."""
+    """Checks of a solution, in order; its truth value is `passed`.
+
+    Examples
+    --------
+    >>> verdict = Verification((Check("total word is empty", False, "wraps red 1"),))
+    >>> verdict.passed
+    False
+    >>> print(verdict)
+    FAIL  total word is empty  wraps red 1
+    """
 
     checks: tuple[Check, ...]
 
@@ -106,6 +115,14 @@ def verify(
     ------
     InputError
         The solution names obstacles or goals that the problem does not have.
+
+    Examples
+    --------
+    >>> from netsp import Problem, solve
+    >>> problem = Problem.load("problems/pool.json")
+    >>> verdict = verify(problem, solve(problem))
+    >>> bool(verdict)
+    True
     """
     for name, value, kind in (("problem", problem, Problem), ("solution", solution, Solution)):
         if not isinstance(value, kind):

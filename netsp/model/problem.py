@@ -71,7 +71,14 @@ problem's size."""
 
 
 class Circle(Model):
-    """Vertical cylinder of unlimited height, given by its plan: centre and radius."""
+    """Vertical cylinder of unlimited height, given by its plan: centre and radius.
+
+    Examples
+    --------
+    >>> pile = Circle(center=(2, 0), radius=0.5, name="pile")
+    >>> pile.signed_distance([(3, 0), (2, 0)])
+    array([ 0.5, -0.5])
+    """
 
     center: Annotated[Point2, Field(description="(x, y) of the axis, in the problem's units")]
     radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
@@ -95,7 +102,14 @@ class Circle(Model):
 
 
 class Polygon(Model):
-    """Vertical prism of unlimited height over a simple polygon, convex or not."""
+    """Vertical prism of unlimited height over a simple polygon, convex or not.
+
+    Examples
+    --------
+    >>> pier = Polygon(polygon=[(0, 0), (4, 0), (4, 1), (0, 1)], name="pier")
+    >>> pier.representative_point
+    (2.0, 0.5)
+    """
 
     polygon: Annotated[
         Annotated[tuple[Point2, ...], Field(min_length=3)],
@@ -149,7 +163,13 @@ Obstacle = Annotated[
 
 
 class Goal(Model):
-    """Point to inspect; of the goals of one choice, one suffices."""
+    """Point to inspect; of the goals of one choice, one suffices.
+
+    Examples
+    --------
+    >>> Goal(position=(4, 0), name="anode").position
+    (4.0, 0.0, 0.0)
+    """
 
     position: Annotated[
         Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
@@ -203,7 +223,16 @@ GoalLike = Annotated[
 
 
 class State(Model):
-    """State of a robot on a tether: its position, and the word of the taut tether there."""
+    """State of a robot on a tether: its position, and the word of the taut tether there.
+
+    Examples
+    --------
+    >>> state = State(position=(4, 0), signature=[1])  # the tether passes obstacle 1 on its left
+    >>> problem = Problem(base=(0, 0), goals=[(6, 0)], tether_length=9, state=state,
+    ...                   obstacles=[Circle(center=(2, 0), radius=0.5)])
+    >>> problem.state.signature
+    (1,)
+    """
 
     position: Annotated[Point3, Field(description="(x, y, z) of the robot, in the problem's units")]
     signature: Annotated[

@@ -48,6 +48,13 @@ class Status(StrEnum):
     INVALID
         Tour of a baseline that ignores the tether: it entangles obstacles or overstretches the
         tether.
+
+    Examples
+    --------
+    >>> Status("optimal_of_kept").is_optimal, Status.FEASIBLE.is_optimal
+    (True, False)
+    >>> Status.OPTIMAL_OF_KEPT.verdict
+    'shortest over the classes kept, which are not all'
     """
 
     OPTIMAL = "optimal"
@@ -259,6 +266,15 @@ class Solution(Drawn, FileModel):
         Pairs of goals (from 0), one for each leg for which no taut path was found.
     entangled : tuple of int
         Obstacles (from 0) that the path is wrapped around; only an `invalid` tour has any.
+
+    Examples
+    --------
+    >>> from netsp import Problem, solve
+    >>> solution = solve(Problem.load("problems/pool.json"))
+    >>> solution.status.value, round(solution.length, 2), [visit.goal for visit in solution.tour]
+    ('optimal', 29.58, [1, 3, 4, 2, 0])
+    >>> solution.proof
+    'proven optimal'
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.problem_picture:draw_solution"

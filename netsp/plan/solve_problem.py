@@ -124,6 +124,13 @@ def travel_graph(
         Unknown name, or bad option.
     InfeasibleError
         Some goal is out of the tether's reach.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> graph = travel_graph(Problem.load("problems/pool.json"))
+    >>> graph.goal_count, len(graph.cluster)
+    (5, 135)
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")

@@ -96,6 +96,13 @@ class TravelGraph(Instance, Drawn):
         Whether a rule (`non-looping`) left classes out, of whose tethers nothing is known.
     goal : ndarray of int, shape (V,)
         Number of each vertex's goal, from 1: the cluster, but for goals with alternatives.
+
+    Examples
+    --------
+    >>> from netsp import Problem, travel_graph
+    >>> graph = travel_graph(Problem.load("problems/pool.json"))
+    >>> graph.signatures[1], round(float(graph.tethers[1]), 2)  # shortest tether to goal 0
+    ((1,), 3.72)
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.graph_picture:draw_classes"

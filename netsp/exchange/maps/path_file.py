@@ -80,6 +80,14 @@ def read_paths(
     InputError
         The file holds no path, a number is wrong, or degrees are given and the problem has no
         origin.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> problem = Problem.load("problems/wharf.json")
+    >>> (found,) = read_paths("examples/paths/wharf-systematic-1.csv", problem)
+    >>> found.points.shape
+    (15, 3)
     """
     if frame is not None and frame not in FRAMES:
         raise InputError(f"--frame: expected local or global, got {shown(frame)}")

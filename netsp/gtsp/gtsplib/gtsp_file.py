@@ -61,6 +61,12 @@ class GtsplibInstance(ComparesArrays):
         Cluster of each vertex, from 0.
     places : ndarray, shape (n, 2), optional
         Coordinates of the vertices, for a picture.
+
+    Examples
+    --------
+    >>> ring = load("examples/7ring28.gtsp")
+    >>> ring.summary
+    '28 vertices in 7 clusters of 4 to 4'
     """
 
     name: str

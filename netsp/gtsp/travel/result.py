@@ -43,6 +43,15 @@ class Progress:
         Obstacles that the present state entangles.
     tour : tuple of int, optional
         Vertices of the best tour, as `Result.tour` has them; None while there is none.
+
+    Examples
+    --------
+    >>> from netsp import TravelGraph, solve_graph
+    >>> rows = []
+    >>> graph = TravelGraph.from_costs([[0, 2, 3], [2, 0, 2], [3, 2, 0]], clusters=[0, 1, 2])
+    >>> result = solve_graph(graph, on_progress=rows.append)
+    >>> rows[-1].incumbent, rows[-1].gap
+    (7.0, 0.0)
     """
 
     time: float
@@ -141,6 +150,14 @@ class Result:
         Path of a baseline with status `invalid`; `tour` is then None.
     lower_bound_of : Scope
         Tours that the lower bound holds for.
+
+    Examples
+    --------
+    >>> from netsp import TravelGraph, solve_graph
+    >>> costs = [[0, 2, 3], [2, 0, 2], [3, 2, 0]]
+    >>> result = solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2]))
+    >>> result.status.value, result.length, result.lower_bound, result.gap
+    ('optimal', 7.0, 7.0, 0.0)
     """
 
     tour: tuple[int, ...] | None

@@ -359,6 +359,12 @@ def solve_mission(
         As `netsp.plan.space.space_plan.plan` and `netsp.world.simulator.mission_run.simulate`.
     LimitReachedError
         No tour was found on which the tether stays within its limit.
+
+    Examples
+    --------
+    >>> from netsp.world.mission.mission import Mission
+    >>> planned = solve_mission(Mission.load("missions/basin.json"))  # doctest: +SKIP
+    >>> planned.mission.save("planned.json")  # doctest: +SKIP
     """
     policy = policy or MissionPolicy()
 

@@ -50,6 +50,14 @@ class PathPolicy:
         least.
     route : FreeRoutePolicy
         Detours around the obstacles that a path enters.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> problem = Problem(base=(0, 0), goals=[(3, 4)], tether_length=9)
+    >>> path = [(0, 0), (3, 3.7), (0, 0)]
+    >>> measure_path(problem, path).order, measure_path(problem, path, policy=PathPolicy(0.5)).order
+    ((), (0,))
     """
 
     radius: float | None = None
@@ -108,6 +116,14 @@ class GoalVisit:
         the goal.
     word : Word
         Word of the tether at the goal.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> problem = Problem(base=(0, 0), goals=[(3, 4)], tether_length=9)
+    >>> (visit,) = measure_path(problem, [(0, 0), (3, 0), (3, 4), (0, 0)]).visits
+    >>> visit.goal, visit.along, visit.tether, visit.miss
+    (0, 7.0, 5.0, 0.0)
     """
 
     goal: int
@@ -174,6 +190,14 @@ class PathMeasures:
         The path with heights.
     carried : CarriedTether
         Tethers at the points of `loop` up to the end of the path.
+
+    Examples
+    --------
+    >>> from netsp import Problem
+    >>> problem = Problem(base=(0, 0), goals=[(4, 1)], tether_length=9)
+    >>> measures = measure_path(problem, [(0, 0), (3, 0), (4, 1), (0, 0)])
+    >>> measures.order, round(measures.longest_tether, 2), measures.is_free, measures.fits
+    ((0,), 4.12, True, True)
     """
 
     problem: Problem = field(repr=False)

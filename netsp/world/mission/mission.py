@@ -161,6 +161,12 @@ class Mission(FileModel):
     is no room. With a state, only waypoints still to be visited are listed. The planner
     `predictive` follows a planned tour (`netsp.plan.space.mission_solver`). The current does not
     act on a kinematic vehicle.
+
+    Examples
+    --------
+    >>> mission = Mission.load("missions/basin.json")
+    >>> len(mission.waypoints), mission.tether_length, mission.load_scene().name
+    (97, 8.0, 'basin')
     """
 
     file_kind: ClassVar[str] = "mission"

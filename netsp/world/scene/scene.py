@@ -153,6 +153,12 @@ class Scene(FileModel):
         Length by which everything is grown for the tether, metres.
     bounds : (xmin, ymin, zmin, xmax, ymax, zmax) or None
         Box that the robot stays in, metres.
+
+    Examples
+    --------
+    >>> scene = Scene(solids=[{"sphere": {"center": [0, 0, 0], "radius": 1}}])
+    >>> scene.field().distance([(3, 0, 0)])
+    array([2.])
     """
 
     file_kind: ClassVar[str] = "scene"

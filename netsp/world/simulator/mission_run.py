@@ -129,6 +129,13 @@ def simulate(
     InputError
         Before the first step: a name is unknown, a waypoint lies inside a solid, anchor and start
         are in different parts of the water, or the tether is shorter than the path between them.
+
+    Examples
+    --------
+    >>> from netsp.world.mission.mission import Mission
+    >>> run = simulate(Mission.load("missions/basin.json"), "none")  # doctest: +SKIP
+    >>> run.summary["visited"], round(run.summary["longest_tether"], 1)  # doctest: +SKIP
+    (97, 17.8)
     """
     check_names(planner, vehicle, tether)
     check_size(mission, policy)

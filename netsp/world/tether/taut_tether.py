@@ -45,6 +45,14 @@ class Tether(ComparesArrays):
         Length along the surfaces on which the tether rests, metres.
     residual : float
         Motion of a node in the last round of pulling, metres.
+
+    Examples
+    --------
+    >>> from netsp.world import GeodesicTether, Scene
+    >>> scene = Scene(solids=[{"capsule": {"a": [0, 0, -5], "b": [0, 0, 5], "radius": 0.5}}])
+    >>> tether = GeodesicTether(scene.field()).start(anchor=(-2, 1, 0), robot=(2, 1, 0))
+    >>> tether.robot, round(tether.length, 2)
+    (array([2., 1., 0.]), 4.0)
     """
 
     strand: Floats
