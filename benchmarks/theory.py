@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 
 from netsp import Circle, Polygon, Problem, solve
 from netsp.base.geometry import polylines
+from netsp.hsignature import reduce
 from netsp.hsignature.rays import crossings, signature
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import TautRoadmap
@@ -253,8 +254,86 @@ def shortest_through(start: Any, goal: Any, gates: Any) -> tuple[Any, Any]:
     return string, unfolded
 
 
+def spiral() -> Any:
+    """Draw the shortest tours of the double spiral, over all classes and over the non-looping ones.
+
+    The tether is drawn at the visit where its word is longest.
+    """
+    file = Path(__file__).parent.parent / "problems" / "known" / "double-spiral.json"
+    problem = Problem.load(file)
+    figure, axes = panels(2, 9.0, 5.2)
+    paths = TautPaths(problem)
+    lengths = []
+    for ax, classes, title in (
+        (axes[0], "all", "all classes"), (axes[1], "non-looping", "non-looping classes")
+    ):  # fmt: skip
+        tour = solve(problem, roadmap_options={"classes": classes})
+        lengths.append(float(tour.length or 0.0))
+        visit = max(tour.tour, key=lambda v: (len(v.signature), v.tether_length))
+        draw_obstacles(ax, problem)
+        draw_rays(ax, problem, 4.6)
+        ax.plot(*np.array(tour.path).T[:2], color=style.PATH, lw=1.4, zorder=4)
+        xy = np.array([g.position[:2] for g in problem.goals])
+        ax.plot(*xy.T, "o", ms=3.5, color=style.GOAL, mec=style.PATH, zorder=5)
+        tether = paths.tether(visit.goal, visit.signature)
+        ax.plot(*tether.T[:2], color=style.TETHER, lw=1.4, ls="--", zorder=6)
+        ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=7)
+        name = f"{title}: {lengths[-1]:.2f} m, longest word {told(visit.signature)}"
+        finish(ax, name, (-4.2, 4.2, -3.6, 4.6))
+        assert (len(visit.signature) == 2) == (classes == "all")
+    assert lengths[0] < 0.98 * lengths[1]
+    handles = [
+        Line2D([], [], color=style.PATH, lw=1.4, label="tour"),
+        Line2D([], [], color=style.TETHER, lw=1.4, ls="--", label="tether of the longest word"),
+        Line2D([], [], color=style.EDGE, lw=1.0, ls=":", label="ray of the pile"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def branches() -> Any:
+    """Draw one crossing that all legs between two branches of tethers share."""
+    far = [(8.0, 3.2), (8.6, 2.2), (7.6, 1.4), (8.0, -3.4), (8.6, -2.2), (7.4, -1.2)]
+    problem = Problem(
+        base=(0, 0), goals=far, tether_length=14,
+        obstacles=[Circle(center=(4.0, 2.4), radius=1.0), Circle(center=(4.6, -2.2), radius=1.0)],
+    )  # fmt: skip
+    paths = TautPaths(problem)
+    upper, lower = (1, 2), ()
+    words = [upper] * 3 + [lower] * 3
+    products = []
+    figure, axes = panels(2, 11.0, 4.2)
+    for ax in axes:
+        draw_obstacles(ax, problem)
+        ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=7)
+    for k, word in enumerate(words):
+        tether = paths.tether(k, word)
+        axes[0].plot(*tether.T[:2], color=style.TETHER, lw=1.3, zorder=4)
+    for u in range(3):
+        for v in range(3, 6):
+            between = reduce([*(-a for a in reversed(words[u])), *words[v]])
+            leg = paths.path(u + 1, v + 1, between)
+            axes[1].plot(*leg.T[:2], color=style.PATH, lw=1.3, zorder=4)
+            tethers = paths.length(0, u + 1, words[u]) + paths.length(0, v + 1, words[v])
+            products.append(0.5 * (tethers - paths.length(u + 1, v + 1, between)))
+    assert np.ptp(products) < 1e-9
+    for ax in axes:
+        for names, rows in (("u", far[:3]), ("v", far[3:])):
+            for k, (x, y) in enumerate(rows):
+                ax.plot(x, y, "o", ms=5, color=style.GOAL, mec=style.PATH, zorder=6)
+                ax.annotate(f"{names}{'₁₂₃'[k]}", (x, y), xytext=(6, -3),
+                            textcoords="offset points", fontsize=8)  # fmt: skip
+        ax.annotate("p", (4.0, 2.4), ha="center", va="center", fontsize=9)
+        ax.annotate("q", (4.6, -2.2), ha="center", va="center", fontsize=9)
+    box = (-0.8, 9.6, -4.2, 4.2)
+    finish(axes[0], "tethers: two branches of a tree", box)
+    finish(axes[1], f"nine legs, one crossing: Gromov product {products[0]:.4g} m", box)
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Any]] = {
-    "words": words, "limit": limit, "pending": pending, "slits": slits
+    "words": words, "limit": limit, "pending": pending, "slits": slits, "spiral": spiral,
+    "branches": branches,
 }  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from netsp import Problem, Status, solve, verify
+from netsp.hsignature import is_looping
 from tests.brute import BruteForce
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -102,6 +103,20 @@ def test_every_real_problem_is_proven_and_verified(path):
         again = solve(problem, params={"backend": "cbc"})
         assert again.status is Status.OPTIMAL
         assert math.isclose(again.length, solution.length, rel_tol=2e-6)
+
+
+def test_the_shortest_tour_of_the_double_spiral_winds_its_tether_twice():
+    """The non-looping rule of 2017 can cost the optimum: Proposition 10 of docs/theory."""
+    problem = Problem.load(KNOWN / "double-spiral.json")
+    shortest = solve(problem)
+    assert shortest.status is Status.OPTIMAL
+    table = json.loads((KNOWN / "optima.json").read_text())
+    assert shortest.length == pytest.approx(table["double-spiral"], rel=1e-6)
+    assert verify(problem, shortest), str(verify(problem, shortest))
+    assert any(is_looping(visit.signature) for visit in shortest.tour)
+    restricted = solve(problem, roadmap_options={"classes": "non-looping"})
+    assert restricted.status is Status.OPTIMAL_OF_KEPT
+    assert restricted.lower_bound > 1.02 * shortest.length
 
 
 def test_the_plain_tour_of_the_entangling_pair_is_shorter_and_wrapped():

@@ -41,7 +41,7 @@ class TautRoadmap:
     ----------
     classes
         ``all`` whose taut tether fits, or ``non-looping``, the rule of the 2017 paper, which drops
-        some of them (`netsp.hsignature.is_looping`; docs/theory, fact 7).
+        some of them (`netsp.hsignature.is_looping`; docs/theory, Proposition 10).
     max_classes
         Maximum number of classes, about; by default that of the policy. If there are more, the
         shortest of every goal are kept.
