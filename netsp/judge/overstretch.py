@@ -6,10 +6,10 @@ at the two. So T keeps a limit along the whole path if it keeps the limit at eve
 
 Proof. A point of the cover is a position together with the class of the tether there, and T is the
 distance in the cover from the base with the empty class. In the plane the cover is CAT(0), and with
-heights it is the product of that and a line, which is CAT(0), too (docs/theory, Propositions 2 and 6).
-In a CAT(0) space the distance to a fixed point is convex along geodesics. A straight segment in
-free space lifts to a geodesic, so T is convex along it, and a convex function on an interval is
-largest at an end. ∎
+heights it is the product of that and a line, which is CAT(0), too (docs/theory, Propositions 2
+and 6). In a CAT(0) space the distance to a fixed point is convex along geodesics. A straight
+segment in free space lifts to a geodesic, so T is convex along it, and a convex function on an
+interval is largest at an end. ∎
 
 Many vertices need no string pulling, because T changes by at most the distance travelled. T at a
 vertex is at most T at the last known vertex plus the distance from there, and at most T at the next

@@ -88,7 +88,7 @@ def solve(graph: Instance, params: Params | None = None, limits: Limits | None =
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
     An iteration is one linear or integer program solved. The program is that of McCammon &
-    Hollinger 2017, section IV-B; reduced-cost fixing is netsp's (docs/reference/solvers.md).
+    Hollinger 2017, section IV-B; reduced-cost fixing is netsp's (docs/theory/solvers.md).
     """
     chosen, limits = params or Params(), limits or Limits()
     run = MipRun(graph, limits, search_rounds=chosen.search_rounds, policy=chosen.policy)

@@ -4,7 +4,8 @@ A leg leaves the tether of its start at a bend p, crosses over, and joins the te
 bend q. For any two other classes, one beyond p and one beyond q, the same crossing gives a path of
 tangents: back along the first tether, across, and along the second tether. It slides forwards on
 every arc, except perhaps at p and q, where the angle is known. If it slides forwards there, too, it
-is taut, and a class has one taut path (docs/theory). So, with T the lengths of tethers,
+is taut, and a class has one taut path (docs/theory, Proposition 17). So, with T the lengths of
+tethers,
 
     leg(u, v) = T(u) + T(v) - c(p, q)
 

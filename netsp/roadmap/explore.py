@@ -9,7 +9,7 @@ given classes?* The trie is given; it holds their words with all prefixes. These
 A taut path can cross a ray and cross it back where the ray passes through another obstacle, so the
 word of its beginnings may leave the core for a while. Such *pending* letters are followed as long
 as they can still be cancelled: the path then stays in the hull of the ray and of what the ray cuts
-off other obstacles (lemma on pending letters).
+off other obstacles (Lemma 13 of docs/theory).
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 A taut path may cross the ray of an obstacle and cross it back without going round the obstacle, if
 the ray cuts a part off another obstacle and the path bends around that part. The part is on the far
 side of the ray, as seen from the representative point of the other obstacle. In between, the path
-stays in the convex hull of the piece of the ray between both crossings and these parts (lemma on
-pending letters in docs/theory).
+stays in the convex hull of the piece of the ray between both crossings and these parts (Lemma 13
+of docs/theory).
 """
 
 from __future__ import annotations

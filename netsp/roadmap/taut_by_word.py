@@ -10,8 +10,8 @@ senses, which become directed arcs of the tangent graph. Then, from the start on
 
 This is a funnel (Lee and Preparata 1984) with arcs for corners. The procedure may fail, because the
 path may sweep over obstacles or enter a bay, so its result is verified. A path of tangents that
-slides forwards on every arc is taut, a class has one taut path (docs/theory), and the letters of
-the graph give its word. If the verification fails, a search finds the path
+slides forwards on every arc is taut, a class has one taut path, and the letters of the graph give
+its word (docs/theory, Proposition 16). If the verification fails, a search finds the path
 (`netsp.roadmap.explore`).
 """
 

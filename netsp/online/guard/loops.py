@@ -1,7 +1,7 @@
 """Loops in a taut tether.
 
 In the plan a taut tether is a geodesic of its class. Where it meets itself, the piece in between is
-a geodesic from a place to that same place. Geodesics of a class are unique (../theory.md), so a
+a geodesic from a place to that same place. Geodesics of a class are unique (docs/theory), so a
 loop
 that could be pulled out would have length 0. So every such loop is around something, and has to be
 undone; and a robot that comes to a place where its own tether lies has just closed one.

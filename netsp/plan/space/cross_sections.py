@@ -2,7 +2,7 @@
 
 A certain cross-section lies within the solid at every height of the range, and deeper below the
 surface of the solid than a given depth. A path or tether that enters solids by less than that depth
-stays outside of all certain cross-sections (docs/theory).
+stays outside of all certain cross-sections (docs/theory, Section 22).
 """
 
 from __future__ import annotations

@@ -301,8 +301,8 @@ class PlanningContext:
         meanwhile.
 
         Around solids in space the length of the tether is not convex along a straight leg, as it is
-        in the plane (docs/theory, Proposition 4): it may be longer on the leg than at both ends. So the
-        length is computed in steps (`drive_step`).
+        in the plane (docs/theory, Proposition 4): it may be longer on the leg than at both ends. So
+        the length is computed in steps (`drive_step`).
 
         Parameters
         ----------

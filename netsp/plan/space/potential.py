@@ -5,7 +5,7 @@ no path between two points is shorter than the difference of the potential at th
 here is trilinear in each cell of a grid, and covers all cells that are not certain to be blocked: a
 passage that may be open is never closed. Fast marching (Sethian 1996) makes it, and overshoots a
 little; then its values are lowered until its steepest slope is one. The slope of a trilinear
-function is steepest in a corner of a cell. The proof is in docs/theory.
+function is steepest in a corner of a cell. The proof is Proposition 30 of docs/theory.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Tours of scenes whose solids are all upright prisms, from the exact roadmap of the plane.
 
 Among upright prisms the water is the product of a plane and an interval, so the homotopy classes of
-paths are those of the plane (docs/theory, Proposition 6). The taut roadmap therefore knows all classes
-of such a scene, and the solvers find the shortest tour over them. This tour is a candidate: it is
-driven and judged in space like any other.
+paths are those of the plane (docs/theory, Proposition 6). The taut roadmap therefore knows all
+classes of such a scene, and the solvers find the shortest tour over them. This tour is a candidate:
+it is driven and judged in space like any other.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Remove all other solids, and shrink these a little. No path and no tether gets l
 free tether stays free, so the shortest tour of the reduced scene bounds all tours. The reduced
 scene is a problem in the plane with heights. The exact roadmap and its solvers bound its tours over
 all homotopy classes of the tether. The proof, and which solids stand through all depths, is in
-docs/theory ("Upright solids").
+docs/theory, Section 22.
 """
 
 from __future__ import annotations
