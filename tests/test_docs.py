@@ -127,6 +127,13 @@ def test_the_site_has_every_page_every_public_name_and_every_field():
         assert all(f"| `{field}` |" in shown for field in model.model_fields)
 
 
+def test_pictures_of_a_notebook_lie_beside_its_page():
+    linked_from = runpy.run_path(str(ROOT / "docs" / "hooks" / "pages.py"))["linked_from"]
+    text = "![png](tour_5_0.png) [next](own-solver.ipynb) [fly](../docs/guide/fly-it.md)"
+    page = linked_from("tutorials/tour.md", text, Path("examples"), kept={"tour_5_0.png"})
+    assert page == "![png](tour_5_0.png) [next](own-solver.md) [fly](../guide/fly-it.md)"
+
+
 def test_tables_are_the_rows_that_benchmarks_kept():
     done = subprocess.run(
         [sys.executable, "benchmarks/tables.py", "--check"],

@@ -6,7 +6,7 @@ from __future__ import annotations
 import posixpath
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import nbformat
@@ -51,19 +51,21 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def run(notebook: Path) -> dict[str, str | bytes]:
     """Return a notebook as a page with the output of its cells, and its pictures."""
     book = nbformat.read(notebook, as_version=4)
-    ExecutePreprocessor(timeout=120, extra_arguments=["--log-level=40"]).preprocess(
-        book, {"metadata": {"path": str(EXAMPLES)}}
-    )
+    ExecutePreprocessor(
+        timeout=120, extra_arguments=["--log-level=40"], coalesce_streams=True
+    ).preprocess(book, {"metadata": {"path": str(EXAMPLES)}})
     exporter = MarkdownExporter()
     text, resources = exporter.from_notebook_node(
         book, resources={"unique_key": f"{notebook.stem}-pictures"}
     )
-    text = linked_from(f"tutorials/{notebook.stem}.md", text, Path("examples"))
-    pictures = {f"tutorials/{name}": data for name, data in resources["outputs"].items()}
-    return {f"tutorials/{notebook.stem}.md": text, **pictures}
+    pictures = resources["outputs"]
+    text = linked_from(f"tutorials/{notebook.stem}.md", text, Path("examples"), kept=pictures)
+    text = text.replace("![png](", "![Picture that the cell above draws](")
+    beside = {f"tutorials/{name}": data for name, data in pictures.items()}
+    return {f"tutorials/{notebook.stem}.md": text, **beside}
 
 
-def linked_from(page: str, markdown: str, folder: Path) -> str:
+def linked_from(page: str, markdown: str, folder: Path, kept: Collection[str] = ()) -> str:
     """Return the text with its links as seen from a page of the site.
 
     Parameters
@@ -74,13 +76,15 @@ def linked_from(page: str, markdown: str, folder: Path) -> str:
         Text whose links start from `folder` of the repository.
     folder : Path
         Folder of the repository, relative to its root.
+    kept : collection of str
+        Links to files beside the page, which stay as they are.
     """
 
     def link(match: re.Match[str]) -> str:
         path, mark, anchor = match[1].partition("#")
         target = posixpath.normpath(posixpath.join(folder.as_posix(), path))
         shown = {source: name for name, source in BESIDE.items()}.get(target, target)
-        if "://" in path or not path:
+        if "://" in path or not path or path in kept:
             return match[0]
         if re.fullmatch(r"examples/[\w-]+\.ipynb", target):
             shown = f"tutorials/{Path(target).stem}.md"
