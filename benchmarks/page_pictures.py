@@ -169,6 +169,52 @@ def compare_solvers(target: Path) -> None:
     (target.parent / "rows-length.png").rename(target)
 
 
+def tether(target: Path) -> None:
+    """The tour's length as a function of the tether's length."""
+    run_netsp("tether", "problems/wharf.json", "--plot", str(target), folder=target.parent)
+
+
+def briefing(target: Path) -> None:
+    """The upper part of the briefing sheet of the wharf's tour."""
+    from playwright.sync_api import sync_playwright
+
+    folder = target.parent
+    run_netsp("solve", "problems/wharf.json", "--margin", "0.3", "-o", "tour.json", folder=folder)
+    run_netsp(
+        "report", "tour.json", "--problem", "problems/wharf.json", "-o", "tour.html",
+        folder=folder,
+    )  # fmt: skip
+    browser_file = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 900, "height": 1250})
+        page.goto((folder / "tour.html").as_uri())
+        page.wait_for_timeout(500)
+        page.screenshot(path=target)
+        browser.close()
+
+
+def site(target: Path) -> None:
+    """The site of the page on structures in 3D, which the page's block of Python makes."""
+    text = (ROOT / "docs" / "guide" / "structures-in-3d.md").read_text(encoding="utf-8")
+    block = re.findall(r"^```python\n(.*?)^```", text, re.S | re.M)[0]
+    subprocess.run([sys.executable, "-c", block], cwd=target.parent, check=True)
+    run_netsp("plot", "site.json", "-o", str(target), folder=target.parent)
+
+
+def flown(target: Path) -> None:
+    """The flight of the page on structures in 3D."""
+    folder = target.parent
+    site(target)
+    run_netsp(
+        "cover", "site.json", "--anchor=-3,-3,-1", "--inspect", "mesh", "--patch", "0.5",
+        "--camera", "3", "--share", "0.9", "-o", "survey.json", folder=folder,
+    )  # fmt: skip
+    run_netsp("solve", "survey.json", "--time-limit", "15", "-o", "planned.json", folder=folder)
+    run_netsp("execute", "planned.json", "-o", "flown", folder=folder)
+    shutil.copy(folder / "flown" / "run.png", target)
+
+
 PICTURES: tuple[Callable[[Path], None], ...] = (
     app,
     app_reach,
@@ -179,6 +225,10 @@ PICTURES: tuple[Callable[[Path], None], ...] = (
     import_tank,
     import_basin,
     compare_solvers,
+    tether,
+    briefing,
+    site,
+    flown,
 )
 
 
