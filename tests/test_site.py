@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, Solution, solve, verify
-from netsp.base.errors import SeveralErrors
+from netsp.base.errors import SeveralErrors, UnansweredError
 from netsp.command.main import main
 from netsp.exchange.maps import Projection, read_site
 from netsp.exchange.maps.drawn_shapes import circle_of
@@ -302,6 +302,18 @@ def test_goals_out_of_reach_are_left_out_only_when_asked(seed, tmp_path):
     assert len(found.goals) == 4
     (note,) = (n for n in notes if "left out" in n)
     assert "7 features left out: farther from the base than the tether is long (50 m)" in note
+
+
+def test_a_drawing_without_a_unit_that_may_be_in_millimetres_asks_for_the_unit():
+    """Its goals are kilometres away if its lengths are metres."""
+    drawing = Path(__file__).parent.parent / "examples" / "tank.dxf"
+    with pytest.raises(UnansweredError, match=r"states no unit.*--units mm") as caught:
+        read_site(drawing, tether=25.0)
+    assert caught.value.asks == ("units",)
+    assert read_site(drawing, tether=25.0, units="mm").goals
+    with pytest.raises(UnansweredError, match=r"GOALS.*skip-unreachable") as caught:
+        read_site(drawing, tether=5000.0)
+    assert caught.value.asks == ()
 
 
 def test_goals_that_only_a_longer_way_round_reaches_are_left_out_too(tmp_path, capsys):

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from netsp.base.units import UNITS
 from netsp.exchange.maps.map_context import MapContext, label, length_text
 
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
+UNITS_OPTION = "; give the unit with --units, as --units mm"
 
 
 def goals_within_reach(
@@ -41,21 +43,23 @@ def goals_within_reach(
         context.complain(
             f"{len(far)} goals are farther from the base than the tether is long "
             f"({length_text(tether)}), {label(goal)} {length_text(distance)}"
-            f"{_cause(context, goal, tether)}",
-            SKIP_OPTION,
+            f"{_cause(context, goal, distance, tether)}",
+            *_remedy(context, distance, tether),
         )
     else:
         for distance, goal in far:
             context.complain(
                 f"{label(goal)}: is {length_text(distance)} from the base, and the tether "
-                f"{length_text(tether)} long{_cause(context, goal, tether)}",
-                SKIP_OPTION,
+                f"{length_text(tether)} long{_cause(context, goal, distance, tether)}",
+                *_remedy(context, distance, tether),
             )
     return near
 
 
-def _cause(context: MapContext, goal: dict[str, Any], tether: float) -> str:
+def _cause(context: MapContext, goal: dict[str, Any], distance: float, tether: float) -> str:
     """Return a likely cause for a goal that is far away, or an empty text."""
+    if _is_unit_doubtful(context, distance, tether):
+        return ": the map states no unit, so its lengths were taken as metres"
     if context.projection is None:
         return ""
     ((lat, lon),) = context.projection.to_earth([goal["position"][:2]])
@@ -68,6 +72,21 @@ def _cause(context: MapContext, goal: dict[str, Any], tether: float) -> str:
         if swapped <= 10.0 * tether < as_read:
             return ": latitude and longitude look swapped"
     return ""
+
+
+def _remedy(context: MapContext, distance: float, tether: float) -> tuple[str, str | None]:
+    """Return the option that helps with a goal that is far away, and what to ask the user for."""
+    if _is_unit_doubtful(context, distance, tether):
+        return UNITS_OPTION, "units"
+    return SKIP_OPTION, None
+
+
+def _is_unit_doubtful(context: MapContext, distance: float, tether: float) -> bool:
+    """Return whether nobody stated a unit, and a goal that far away may be meant in millimetres."""
+    is_assumed = context.options.units is None and context.map.metres is None
+    if context.map.is_geographic or context.is_chart or not is_assumed:
+        return False
+    return distance * UNITS["mm"] <= tether < distance / 10.0
 
 
 def check_scale(
