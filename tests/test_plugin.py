@@ -390,6 +390,9 @@ def test_a_reader_of_maps_may_be_a_function_of_ones_own(tmp_path, monkeypatch):
     monkeypatch.setitem(MAP_READERS, "mine", read)
     (tmp_path / "site.mine").write_text("")
     assert solve(read_site(tmp_path / "site.mine", tether=3.0)).length == 4.0
+    monkeypatch.setitem(MAP_READERS, "mine", lambda file: 5)
+    with pytest.raises(InputError, match=r"reader of \.mine: expected a Map from it, got 5"):
+        read_site(tmp_path / "site.mine", tether=3.0)
 
 
 def test_a_name_of_ours_cannot_be_taken_and_a_broken_package_costs_one_line(monkeypatch):
