@@ -28,6 +28,8 @@ WINDOW: Any = {"width": 1100, "height": 700}  # of the browser, px
 
 COLOURS = 128  # of a picture's palette: fewer show in the shades of the app, more only cost space
 
+MIN_BYTES = 100_000  # of a picture that gets a palette: smaller ones keep all of their colours
+
 
 def save_small(picture: Path, target: Path) -> None:
     """Write a picture as a PNG with a palette, which takes about a third of the space."""
@@ -215,6 +217,79 @@ def flown(target: Path) -> None:
     shutil.copy(folder / "flown" / "run.png", target)
 
 
+@contextmanager
+def vehicle_page(**options: Any) -> Iterator[tuple[Any, Any]]:
+    """Open the page of a guard in a browser, and yield its server (a `guard_page.Page`) and itself.
+
+    Options are those of the server, which shows the wharf.
+    """
+    from playwright.sync_api import sync_playwright
+
+    from netsp import Problem
+    from netsp.online.guard.guard_page import Page
+
+    browser_file = shutil.which("chromium") or shutil.which("chromium-browser")
+    problem = Problem.load(ROOT / "problems" / "wharf.json")
+    with Page(problem, 0, **options) as served, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1080, "height": 860})
+        page.goto(served.address)
+        page.wait_for_timeout(1000)
+        yield served, page
+        page.wait_for_timeout(1000)
+        browser.close()
+
+
+def guard(target: Path) -> None:
+    """The page of a guard at the moment when the recorded vehicle closes a loop."""
+    from netsp import Problem
+    from netsp.online.guard.replay import read_fixes
+    from netsp.online.guard.stream import replay_fixes
+    from netsp.online.guard.tether_guard import Guard, GuardOptions
+    from netsp.online.link.geo_frame import Frame
+
+    problem = Problem.load(ROOT / "problems" / "wharf.json")
+    watching = Guard(problem, GuardOptions(noise=0.05, drift=0.1))
+    fixes = list(read_fixes(ROOT / "examples" / "wharf-loop.csv.gz", Frame(problem)))
+    with vehicle_page() as (served, page):
+        for report in replay_fixes(watching, fixes):
+            served.send(report.as_row())
+            page.wait_for_timeout(10)
+            if any(alarm.kind == "loop" and alarm.level == 4 for alarm in report.alarms):
+                break
+        page.wait_for_timeout(1000)
+        page.screenshot(path=target)
+
+
+def fly(target: Path) -> None:
+    """The page of a flight past the middle of the tour of the wharf."""
+    from netsp import Problem, solve
+    from netsp.command.fly import _guard_callback
+    from netsp.online.execute.execution_log import ExecutionOptions
+    from netsp.online.execute.tour_execution import execute
+
+    problem = Problem.load(ROOT / "problems" / "wharf.json")
+    flown = execute(problem, solve(problem), ExecutionOptions(speed=0.5))
+    with vehicle_page(accepts_events=True) as (served, page):
+        show = _guard_callback(problem, served, 0.5)
+        for row in flown.rows[: int(0.55 * len(flown.rows))]:
+            show(row)
+            page.wait_for_timeout(5)
+        page.wait_for_timeout(1000)
+        page.screenshot(path=target)
+
+
+def rehearse(target: Path) -> None:
+    """A simulated run with an obstacle, a cancelled goal and a push."""
+    folder = target.parent
+    run_netsp("solve", "problems/wharf.json", "-o", "tour.json", folder=folder)
+    run_netsp(
+        "execute", "problems/wharf.json", "tour.json", "--surprise", "examples/surprises.json",
+        "-o", "run", folder=folder,
+    )  # fmt: skip
+    shutil.copy(folder / "run" / "run.png", target)
+
+
 PICTURES: tuple[Callable[[Path], None], ...] = (
     app,
     app_reach,
@@ -229,6 +304,9 @@ PICTURES: tuple[Callable[[Path], None], ...] = (
     briefing,
     site,
     flown,
+    guard,
+    fly,
+    rehearse,
 )
 
 
@@ -243,7 +321,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             raw = Path(folder) / f"{name}.png"
             made[name](raw)
-            save_small(raw, args.folder / f"{name}.png")
+            if raw.stat().st_size < MIN_BYTES:
+                shutil.copy(raw, args.folder / f"{name}.png")
+            else:
+                save_small(raw, args.folder / f"{name}.png")
         print(f"{name}.png: {(args.folder / f'{name}.png').stat().st_size / 1000:.0f} kB")
 
 

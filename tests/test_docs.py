@@ -144,5 +144,10 @@ def test_tables_are_the_rows_that_benchmarks_kept():
     assert done.returncode == 0, done.stdout
 
 
+def test_the_table_of_mavlink_messages_names_all_that_the_code_uses():
+    hook = runpy.run_path(str(ROOT / "docs" / "hooks" / "mavlink.py"))
+    assert "| LOCAL_POSITION_NED |" in "\n".join(hook["table"]())
+
+
 def test_every_page_has_what_it_shows():
     assert sum(1 for page in PAGES for _ in blocks(page)) >= 10

@@ -24,13 +24,19 @@ sys.path.insert(0, str(Path(__file__).parent))  # hooks are loaded as single fil
 import command_reference  # noqa: E402
 import format_reference  # noqa: E402
 import licences  # noqa: E402
+import mavlink  # noqa: E402
 import modules  # noqa: E402
+import policies  # noqa: E402
 
 GENERATED: dict[str, Callable[[], list[str]]] = {
+    "<!-- alarms -->": policies.alarms,
     "<!-- commands -->": command_reference.sections,
     "<!-- commands contents -->": command_reference.contents,
+    "<!-- flight policies -->": policies.flight,
     "<!-- formats -->": format_reference.sections,
+    "<!-- guard policies -->": policies.guard,
     "<!-- licences -->": licences.table,
+    "<!-- mavlink -->": mavlink.table,
     "<!-- modules -->": modules.module_list,
     "<!-- tolerances -->": modules.tolerances,
 }
