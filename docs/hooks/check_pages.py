@@ -180,19 +180,26 @@ def options(root: Path = ROOT) -> Iterator[Found]:
         yield "netsp/command/command_table.py", 1, f"no description: {option}"
 
 
+def words_of(name: str) -> set[str]:
+    """Return the words of a title or a file's name, in lower case and without a plural's s."""
+    return {w.removesuffix("s") for w in re.findall(r"[a-z0-9]+", name.lower())}
+
+
 def navigation(root: Path = ROOT) -> Iterator[Found]:
-    """Yield entries of the navigation that are not named as their files."""
+    """Yield entries of the navigation that are named unlike their files or their headings."""
     text = (root / "mkdocs.yml").read_text(encoding="utf-8")
     nav = yaml.safe_load(text[text.index("\nnav:") :])["nav"]
     for section in nav:
         for entries in section.values():
             for entry in entries if isinstance(entries, list) else []:
                 ((title, file),) = entry.items()
-                expected = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
-                stem = Path(file).stem
-                if stem not in (expected, "index"):
-                    number = line_of(text, text.index(file))
-                    yield "mkdocs.yml", number, f"{title!r} is {file}; expected {expected}.md"
+                number = line_of(text, text.index(f": {file}\n"))
+                if Path(file).stem != "index" and not words_of(Path(file).stem) <= words_of(title):
+                    yield "mkdocs.yml", number, f"{title!r} has not all words of {file}"
+                page = root / "docs" / file
+                heading = re.search(r"^# (.*)$", page.read_text() if page.exists() else "", re.M)
+                if heading and heading[1].replace("`", "") != title:
+                    yield "mkdocs.yml", number, f"{title!r} is headed {heading[1]!r} in {file}"
 
 
 CHECKS: dict[str, Callable[[Path], Iterator[Found]]] = {

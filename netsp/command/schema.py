@@ -20,7 +20,7 @@ FORMATS = {
 """Model of each format, as `module:class`."""
 
 
-SECTION = re.compile(r"\n\n((Parameters|Attributes|Raises|Examples)\n-{3,}\n|>>> ).*", re.DOTALL)
+SECTION = re.compile(r"\n\n((Parameters|Attributes|Raises|Examples)\n-{3,}\n|>{3} ).*", re.DOTALL)
 """Sections and examples of a docstring, which are about Python."""
 
 

@@ -21,8 +21,10 @@ MAX_NAMED = 5
 class OmittedFeatures(Model):
     """Features of one layer that were left out for one reason."""
 
-    reason: Annotated[str, Field(description="why they were left out", max_length=300)]
-    features: Annotated[int, Field(description="number of them", ge=1)]
+    reason: Annotated[
+        str, Field(description="reason why the features were left out", max_length=300)
+    ]
+    features: Annotated[int, Field(description="number of features", ge=1)]
     first: Annotated[
         tuple[str, ...], Field(description="up to five of these features, by layer and number")
     ] = ()
@@ -37,7 +39,7 @@ class LayerRecord(Model):
         Some features are neither used nor left out.
     """
 
-    layer: Annotated[str, Field(description="name of the layer; empty where the format has none")]
+    layer: Annotated[str, Field(description="name of the layer; empty if the format has none")]
     features: Annotated[int, Field(description="number of its features", ge=0)]
     used: Annotated[
         dict[UsedAs, int],
@@ -97,7 +99,7 @@ class CropCircle(Model):
     center: Annotated[
         tuple[Number, Number], Field(description="(x, y) of its centre, in the problem's units")
     ]
-    radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
+    radius: Annotated[Positive, Field(description="radius of the circle, in the problem's units")]
 
 
 class Site(Model):
@@ -111,7 +113,7 @@ class Site(Model):
     """
 
     file: Annotated[Name, Field(description="name of the map")]
-    imported: Annotated[tuple[LayerRecord, ...], Field(description="its layers")] = ()
+    imported: Annotated[tuple[LayerRecord, ...], Field(description="layers of the map")] = ()
     cropped: Annotated[
         CropCircle | None,
         Field(description="circle outside of which obstacles were left out; null if none were"),

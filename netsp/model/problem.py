@@ -81,8 +81,8 @@ class Circle(Model):
     """
 
     center: Annotated[Point2, Field(description="(x, y) of the axis, in the problem's units")]
-    radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
-    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
+    radius: Annotated[Positive, Field(description="radius of the circle, in the problem's units")]
+    name: Annotated[Name | None, Field(description="name in pictures and messages")] = None
 
     @property
     def representative_point(self) -> tuple[float, float]:
@@ -115,7 +115,7 @@ class Polygon(Model):
         Annotated[tuple[Point2, ...], Field(min_length=3)],
         Field(description="corners (x, y) in order, not closed, in the problem's units"),
     ]
-    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
+    name: Annotated[Name | None, Field(description="name in pictures and messages")] = None
 
     @model_validator(mode="after")
     def _simple(self) -> Self:
@@ -174,7 +174,7 @@ class Goal(Model):
     position: Annotated[
         Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
     ]
-    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
+    name: Annotated[Name | None, Field(description="name in pictures and messages")] = None
     choice: Annotated[
         Name | None, Field(description="name of what it is an alternative for; null for none")
     ] = None
@@ -247,11 +247,15 @@ class State(Model):
 class Origin(Model):
     """Position of the base on the earth, and direction of the y axis."""
 
-    latitude: Annotated[Number, Field(description="of the base, degrees", ge=-90, le=90)]
-    longitude: Annotated[Number, Field(description="of the base, degrees", ge=-180, le=180)]
+    latitude: Annotated[Number, Field(description="latitude of the base, degrees", ge=-90, le=90)]
+    longitude: Annotated[
+        Number, Field(description="longitude of the base, degrees", ge=-180, le=180)
+    ]
     heading: Annotated[
         Number,
-        Field(description="degrees clockwise from true north of the y axis", ge=-360, le=360),
+        Field(
+            description="heading of the y axis, degrees clockwise from true north", ge=-360, le=360
+        ),
     ] = 0.0
 
 
@@ -317,8 +321,8 @@ class Problem(Drawn, FileModel):
 
     model_config = ConfigDict(title="netsp problem")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Name, Field(description="of the problem")] = "problem"
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    name: Annotated[Name, Field(description="name of the problem")] = "problem"
     base: Annotated[
         Point3,
         Field(description="(x, y) or (x, y, z) where the tether is fixed, in the problem's units"),
@@ -373,11 +377,13 @@ class Problem(Drawn, FileModel):
     ] = None
     units: Annotated[Name, Field(description="name of the unit of length")] = "m"
     origin: Annotated[
-        Origin | None, Field(description="where on the earth the base is; null if unknown")
+        Origin | None, Field(description="position of the base on the earth; null if unknown")
     ] = None
     state: Annotated[
         State | None,
-        Field(description="where the robot is already out, with its tether; null at the base"),
+        Field(
+            description="start away from the base, with the tether out; null to start at the base"
+        ),
     ] = None
     site: Annotated[
         Site | None,

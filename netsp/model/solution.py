@@ -195,8 +195,10 @@ def solution_scope(roadmap: str, classes: KeptClasses | None, *, kept_order: boo
 class ProblemReference(Model):
     """Reference to the problem that a solution belongs to."""
 
-    name: Annotated[Name, Field(description="of the problem")]
-    sha256: Annotated[str, Field(description="of what the answer depends on: all values but names")]
+    name: Annotated[Name, Field(description="name of the problem")]
+    sha256: Annotated[
+        str, Field(description="hash of all values that the tour depends on: not of names")
+    ]
 
 
 class Visit(Model):
@@ -212,9 +214,10 @@ class Visit(Model):
         tuple[int, ...], Field(description="h-signature of the tether at the goal")
     ]
     tether_length: Annotated[
-        NonNegative, Field(description="of the taut tether at the goal, in the problem's units")
+        NonNegative,
+        Field(description="length of the taut tether at the goal, in the problem's units"),
     ]
-    name: Annotated[Name | None, Field(description="of the goal; null for none")] = None
+    name: Annotated[Name | None, Field(description="name of the goal; null for none")] = None
     position: Annotated[
         PathPoint | None, Field(description="(x, y, z) of the goal, in the problem's units")
     ] = None
@@ -282,24 +285,24 @@ class Solution(Drawn, FileModel):
 
     model_config = ConfigDict(title="netsp solution")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    problem: Annotated[ProblemReference, Field(description="which problem is solved")]
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    problem: Annotated[ProblemReference, Field(description="problem that is solved")]
     solver: Annotated[Name, Field(description="name of the solver")]
     roadmap: Annotated[Name, Field(description="name of the roadmap")]
     classes: Annotated[
-        KeptClasses | None, Field(description="which homotopy classes the roadmap held")
+        KeptClasses | None, Field(description="homotopy classes that the roadmap kept")
     ] = None
-    seed: Annotated[int | None, Field(description="of all that was random")] = None
+    seed: Annotated[int | None, Field(description="seed of all random numbers")] = None
     margin: Annotated[
         NonNegative,
         Field(
-            description="all obstacles were grown by it, and all that is said holds among those; "
-            "in the problem's units"
+            description="length by which all obstacles were grown, in the problem's units; the "
+            "solution holds among the grown obstacles"
         ),
     ] = 0.0
     slack: Annotated[
         Annotated[NonNegative, Field(le=1.0)],
-        Field(description="share of the taut length that may be out beyond it"),
+        Field(description="slack tether that may be out, as a share of the taut length"),
     ] = 0.0
     friction: Annotated[
         Annotated[NonNegative, Field(le=MAX_FRICTION)],
@@ -307,17 +310,21 @@ class Solution(Drawn, FileModel):
     ] = 0.0
     max_tension_ratio: Annotated[
         Annotated[Number, Field(gt=1.0, le=1e6)] | None,
-        Field(description="most that friction multiplies the tension by; null for no limit"),
+        Field(
+            description="largest factor by which friction may raise the tension; null for no limit"
+        ),
     ] = None
     kept_order: Annotated[
         bool,
         Field(
-            description="the order of the goals was given: bound and status are those of its tours"
+            description="whether the order of the goals was given; bound and status are then "
+            "those of tours in it"
         ),
     ] = False
-    status: Annotated[Status, Field(description="what is proven")]
+    status: Annotated[Status, Field(description="what is proven about the tour")]
     length: Annotated[
-        Total | None, Field(description="of the tour, in the problem's units; null without a tour")
+        Total | None,
+        Field(description="length of the tour, in the problem's units; null without a tour"),
     ]
     lower_bound: Annotated[
         Total | None,
@@ -365,9 +372,12 @@ class Solution(Drawn, FileModel):
             "the problem's units"
         ),
     ] = ()
-    timings: Annotated[Timings, Field(description="how long it took")] = Timings()
+    timings: Annotated[Timings, Field(description="time of each stage")] = Timings()
     versions: Annotated[
-        dict[Name, Name], Field(description="of netsp and what it used", default_factory=dict)
+        dict[Name, Name],
+        Field(
+            description="versions of netsp and of the packages that it used", default_factory=dict
+        ),
     ]
 
     @model_validator(mode="before")

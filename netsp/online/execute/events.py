@@ -36,8 +36,10 @@ Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_checked_wh
 class Move(Model):
     """Move of an obstacle."""
 
-    obstacle: Annotated[Which, Field(description="name or index from 0")]
-    by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
+    obstacle: Annotated[Which, Field(description="name or index from 0 of the obstacle")]
+    by: Annotated[
+        Point2, Field(description="(x, y) by which the obstacle moves, in the problem's units")
+    ]
 
 
 class Event(TimedEvent):
@@ -75,8 +77,8 @@ class Surprises(FileModel):
 
     model_config = ConfigDict(title="netsp surprises")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    events: Annotated[tuple[Event, ...], Field(description="in any order")]
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    events: Annotated[tuple[Event, ...], Field(description="events in any order")]
 
     def check(self, problem: Problem, source: str = "") -> None:
         """Raise InputError for events that a problem cannot have.

@@ -36,7 +36,7 @@ class LeftOut(Model):
     """A goal that was left out."""
 
     goal: Annotated[GoalIndex, Field(description="index of the goal from 0")]
-    reason: Annotated[str, Field(description="why it was left out, in words")]
+    reason: Annotated[str, Field(description="reason in words")]
 
 
 class RunState(FileModel):
@@ -50,7 +50,7 @@ class RunState(FileModel):
 
     model_config = ConfigDict(title="netsp run state")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
     time: Annotated[NonNegative, Field(description="seconds after the start of the run")]
     tether: Annotated[
         tuple[Point3, ...],

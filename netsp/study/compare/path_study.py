@@ -27,8 +27,8 @@ class StudyPath(Model):
 class PathStudy(Model):
     """Study of paths that are compared with the planned tour of one problem."""
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="of the study")]
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="name of the study")]
     problem: Annotated[Name, Field(description="problem file, relative to the study")]
     paths: Annotated[
         Annotated[tuple[StudyPath, ...], Field(min_length=1)], Field(description="compared")

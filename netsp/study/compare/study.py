@@ -29,9 +29,11 @@ Natural = Annotated[Integer, Field(ge=0, le=2**62)]
 class Worlds(Model):
     """Random worlds of a family (`netsp.plan.random_worlds`), with seeds from `first` on."""
 
-    family: Annotated[str, Field(description="of random worlds")] = "icra2017"
-    count: Annotated[Whole, Field(description="worlds per cell")] = 10
-    first: Annotated[Natural, Field(description="seed of the first")] = 0
+    family: Annotated[str, Field(description="family of random worlds")] = "icra2017"
+    count: Annotated[
+        Whole, Field(description="number of worlds for each number of goals and tether length")
+    ] = 10
+    first: Annotated[Natural, Field(description="seed of the first world")] = 0
     obstacles: Annotated[
         Natural | tuple[Natural, Natural] | None,
         Field(
@@ -39,10 +41,10 @@ class Worlds(Model):
             "uniformly; null for the family's own"
         ),
     ] = None
-    side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
+    side: Annotated[Positive, Field(description="side of the square, in units of length")] = 500.0
     radii: Annotated[
         tuple[Positive, Positive],
-        Field(description="least and greatest radius of obstacles, in units of length"),
+        Field(description="smallest and largest radius of obstacles, in units of length"),
     ] = (10.0, 30.0)
 
     @model_validator(mode="after")
@@ -63,10 +65,12 @@ class Worlds(Model):
 class StudyRoadmap(Model):
     """Roadmap of a study, with options; `label` identifies it in the results."""
 
-    name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
-    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
-    options: Annotated[dict[str, Any], Field(description="of the roadmap, by name")] = Field(
-        default_factory=dict
+    name: Annotated[
+        str, Field(description="name of a roadmap: taut, prm or one of another package")
+    ] = "taut"
+    label: Annotated[Name, Field(description="name in tables; the name if empty")] = ""
+    options: Annotated[dict[str, Any], Field(description="options of the roadmap, by name")] = (
+        Field(default_factory=dict)
     )
 
     @model_validator(mode="after")
@@ -83,16 +87,16 @@ class StudyRoadmap(Model):
 class StudySolver(Model):
     """Solver of a study, with options and limits; `label` identifies it in the results."""
 
-    name: Annotated[str, Field(description="one of netsp or of another package")]
-    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
-    time_limit: Annotated[Positive | None, Field(description="seconds; null for the study's")] = (
-        None
-    )
+    name: Annotated[str, Field(description="name of a solver of netsp or of another package")]
+    label: Annotated[Name, Field(description="name in tables; the name if empty")] = ""
+    time_limit: Annotated[
+        Positive | None, Field(description="time limit, seconds; null for that of the study")
+    ] = None
     iteration_limit: Annotated[
         Annotated[Integer, Field(ge=1, lt=2**62)] | None,
-        Field(description="of the solver; null for none"),
+        Field(description="maximum number of iterations; null for no limit"),
     ] = None
-    options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = Field(
+    options: Annotated[dict[str, Any], Field(description="options of the solver, by name")] = Field(
         default_factory=dict
     )
 
@@ -122,31 +126,34 @@ class Study(Model):
         Memory of a trial, GiB, in addition to what a worker needs to start.
     """
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="of the study")]
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="name of the study")]
     goals: Annotated[
         Annotated[tuple[Whole, ...], Field(min_length=1)], Field(description="numbers of goals")
     ]
     tether_lengths: Annotated[
         Annotated[tuple[Positive, ...], Field(min_length=1)],
-        Field(description="in units of length"),
+        Field(description="tether lengths, in units of length"),
     ]
-    worlds: Annotated[Worlds, Field(description="which random worlds")] = Worlds()
+    worlds: Annotated[Worlds, Field(description="random worlds of the study")] = Worlds()
     roadmaps: Annotated[
-        Annotated[tuple[StudyRoadmap, ...], Field(min_length=1)], Field(description="tried each")
+        Annotated[tuple[StudyRoadmap, ...], Field(min_length=1)],
+        Field(description="roadmaps; each is tried"),
     ] = (StudyRoadmap(),)
     solvers: Annotated[
-        Annotated[tuple[StudySolver, ...], Field(min_length=1)], Field(description="tried each")
+        Annotated[tuple[StudySolver, ...], Field(min_length=1)],
+        Field(description="solvers; each is tried"),
     ]
     seeds: Annotated[
-        Annotated[tuple[Natural, ...], Field(min_length=1)], Field(description="of the solvers")
+        Annotated[tuple[Natural, ...], Field(min_length=1)],
+        Field(description="seeds of the solvers"),
     ] = (0,)
     time_limit: Annotated[
-        Positive | None, Field(description="seconds of a trial; null for none")
+        Positive | None, Field(description="time limit of a trial, seconds; null for none")
     ] = 120.0
     memory_limit: Annotated[
         Annotated[Number, Field(gt=0, le=1e6)] | None,
-        Field(description="GiB of a trial; null for none"),
+        Field(description="memory of a trial, GiB; null for no limit"),
     ] = None
 
     @model_validator(mode="after")

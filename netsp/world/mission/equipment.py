@@ -26,9 +26,11 @@ class Camera(Model):
     ] = 70.0
     tilt: Annotated[
         Annotated[float, Field(ge=0.0, le=90.0)],
-        Field(description="maximum angle that it turns up or down, degrees"),
+        Field(description="maximum angle by which the camera turns up or down, degrees"),
     ] = 90.0
-    patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
+    patch: Annotated[
+        Positive, Field(description="side of the surface patches that are counted, m")
+    ] = 0.1
 
 
 class TetherPhysics(Model):
@@ -39,17 +41,17 @@ class TetherPhysics(Model):
 
     slack: Annotated[
         Annotated[NonNegative, Field(le=1.0)],
-        Field(description="share of the taut length that is out beyond it"),
+        Field(description="slack tether, as a share of the taut length"),
     ] = 0.0
     diameter: Annotated[
         Annotated[NonNegative, Field(le=1.0)],
-        Field(description="of the tether, m; with 0 the water does not act on it"),
+        Field(description="diameter of the tether, m; with 0 the water does not act on it"),
     ] = 0.0
-    drag_coefficient: Annotated[NonNegative, Field(description="of a cylinder across the flow")] = (
-        1.2
-    )
+    drag_coefficient: Annotated[
+        NonNegative, Field(description="drag coefficient of a cylinder across the flow")
+    ] = 1.2
     tension: Annotated[
-        Positive, Field(description="that the tether is held with at the anchor, N")
+        Positive, Field(description="tension with which the tether is held at the anchor, N")
     ] = 10.0
     friction: Annotated[
         Annotated[NonNegative, Field(le=10.0)],
@@ -57,7 +59,9 @@ class TetherPhysics(Model):
     ] = 0.0
     max_tension_ratio: Annotated[
         Annotated[Number, Field(gt=1.0, le=1e6)] | None,
-        Field(description="most that friction may multiply the tension by; null for no limit"),
+        Field(
+            description="largest factor by which friction may raise the tension; null for no limit"
+        ),
     ] = None
     pulls_vehicle: Annotated[
         bool, Field(description="whether tension and drag act on a vehicle with dynamics")
@@ -99,7 +103,7 @@ class PositionSensor(Model):
 class RangeSensor(Model):
     """Forward-looking range sensor, such as a scanning sonar, that points along the path."""
 
-    range: Annotated[Positive, Field(description="farthest that it sees, m")] = 5.0
+    range: Annotated[Positive, Field(description="largest distance that the sensor sees, m")] = 5.0
     field_of_view: Annotated[
         Annotated[float, Field(gt=0.0, le=180.0)],
         Field(description="full angle of its cone, degrees"),

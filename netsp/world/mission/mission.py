@@ -173,8 +173,8 @@ class Mission(FileModel):
 
     model_config = ConfigDict(title="netsp mission")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Name, Field(description="of the mission")] = "mission"
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    name: Annotated[Name, Field(description="name of the mission")] = "mission"
     scene: Annotated[str, Field(description="scene file, relative to this one")]
     anchor: Annotated[Point3, Field(description="(x, y, z) where the tether is fixed, m")]
     start: Annotated[
@@ -182,11 +182,16 @@ class Mission(FileModel):
     ]
     track: Annotated[
         tuple[TrackPoint, ...],
-        Field(description="(t, x, y, z) of a moving anchor after 0 s, s and m; none: it stays"),
+        Field(
+            description="(t, x, y, z) of a moving anchor after 0 s, s and m; empty if it does "
+            "not move"
+        ),
     ] = ()
     state: Annotated[
         MissionState | None,
-        Field(description="where the robot is by now and how its tether lies; null: at the start"),
+        Field(
+            description="present position of the robot and line of its tether; null at the start"
+        ),
     ] = None
     waypoints: Annotated[
         Annotated[tuple[WaypointLike, ...], Field(min_length=1)],
@@ -199,8 +204,8 @@ class Mission(FileModel):
     reach: Annotated[
         Positive, Field(description="distance at which a waypoint counts as reached, m")
     ] = 0.1
-    speed: Annotated[Positive, Field(description="of the robot, m/s")] = 0.3
-    camera: Annotated[Camera | None, Field(description="what it sees with; null for none")] = None
+    speed: Annotated[Positive, Field(description="speed of the robot, m/s")] = 0.3
+    camera: Annotated[Camera | None, Field(description="camera of the robot; null for none")] = None
     inspect: Annotated[
         Annotated[tuple[Name, ...], Field(min_length=1)] | None,
         Field(description="names of the solids whose surface counts; null for all"),
@@ -214,7 +219,10 @@ class Mission(FileModel):
     ] = PositionSensor()
     range_sensor: Annotated[
         RangeSensor | None,
-        Field(description="that sees solids which are not on the map; null: all changes are told"),
+        Field(
+            description="sensor that sees solids which are not on the map; null if all changes "
+            "are reported"
+        ),
     ] = None
     tether: Annotated[
         TetherPhysics, Field(description="slack, drag and friction of the tether; none by default")
@@ -229,7 +237,10 @@ class Mission(FileModel):
     ] = None
     tour: Annotated[
         PlannedTour | None,
-        Field(description="that was planned through these waypoints; null: it is left to planners"),
+        Field(
+            description="tour that was planned through these waypoints; null to leave it to the "
+            "planner"
+        ),
     ] = None
 
     @classmethod

@@ -20,10 +20,14 @@ PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
 class PlannedVisit(Model):
     """Visit of a planned tour."""
 
-    path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
+    path: Annotated[
+        PathField, Field(description="path from the previous stop to the waypoint, (x, y, z), m")
+    ]
     signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
-    tether_length: Annotated[NonNegative, Field(description="of the taut tether there, m")]
-    longest_tether: Annotated[NonNegative, Field(description="of tether on the way there, m")]
+    tether_length: Annotated[NonNegative, Field(description="length of the taut tether there, m")]
+    longest_tether: Annotated[
+        NonNegative, Field(description="greatest length of the taut tether on the path there, m")
+    ]
     given_as: Annotated[
         Annotated[int, Field(ge=0)] | None,
         Field(description="number of the waypoint in the mission that was planned"),
@@ -33,8 +37,8 @@ class PlannedVisit(Model):
 class UnresolvedGap(Model):
     """Passage that the robot fits through but the grid of a mission does not show."""
 
-    position: Annotated[Point3, Field(description="(x, y, z) in the middle of it, m")]
-    width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
+    position: Annotated[Point3, Field(description="(x, y, z) of the middle of the passage, m")]
+    width: Annotated[NonNegative, Field(description="width: twice the distance from solids, m")]
 
     def __str__(self) -> str:
         """Return width and position, as in "0.24 m at (0, 1.5, -2)"."""
@@ -60,9 +64,11 @@ class PlannedTour(Model):
 
     stops: Annotated[
         tuple[PlannedVisit, ...],
-        Field(description="one for each of the first waypoints; the others are not reached"),
+        Field(description="stops, one for each of the first waypoints; the others are not reached"),
     ]
-    home: Annotated[PathField, Field(description="from the last stop to the start, m")]
+    home: Annotated[
+        PathField, Field(description="path from the last stop to the start, (x, y, z), m")
+    ]
     status: Annotated[
         Status,
         Field(
@@ -71,26 +77,29 @@ class PlannedTour(Model):
         ),
     ]
     solver: Annotated[Name, Field(description="name of the solver")]
-    seed: Annotated[int, Field(description="of all that was random")] = 0
-    length: Annotated[NonNegative, Field(description="of the tour, m")]
+    seed: Annotated[int, Field(description="seed of all random numbers")] = 0
+    length: Annotated[NonNegative, Field(description="length of the tour, m")]
     lower_bound: Annotated[
         NonNegative | None,
-        Field(description="of tours along the states and legs that were found, m"),
+        Field(description="lower bound on tours along the states and legs that were found, m"),
     ] = None
     gap: Annotated[NonNegative | None, Field(description="(length - lower_bound) / length")] = None
     bound_of_all: Annotated[
         NonNegative | None,
-        Field(description="no tour to these waypoints is shorter, in any class of the tether, m"),
+        Field(
+            description="lower bound on all tours to these waypoints, in any class of the tether, m"
+        ),
     ] = None
     gap_to_all: Annotated[
         NonNegative | None, Field(description="(length - bound_of_all) / length")
     ] = None
     states: Annotated[
         Annotated[int, Field(ge=0)],
-        Field(description="ways in which the tether was found to hang at the waypoints"),
+        Field(description="number of known states of the tether at the waypoints"),
     ] = 0
     legs: Annotated[
-        Annotated[int, Field(ge=0)], Field(description="legs between these that were driven")
+        Annotated[int, Field(ge=0)],
+        Field(description="number of legs between these states that were driven"),
     ] = 0
     exact: Annotated[
         bool,

@@ -45,13 +45,13 @@ _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "hal
 class Solid(Model):
     """Solid of a scene: exactly one shape, and a name."""
 
-    name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
+    name: Annotated[Name | None, Field(description="name in pictures, reports and `inspect`")] = (
         None
     )
     sphere: Annotated[Sphere | None, Field(description="exactly one of these shapes")] = None
-    capsule: Annotated[Capsule | None, Field(description="a cylinder with rounded ends")] = None
-    cylinder: Annotated[Cylinder | None, Field(description="with flat ends")] = None
-    box: Annotated[Box | None, Field(description="in any position")] = None
+    capsule: Annotated[Capsule | None, Field(description="cylinder with rounded ends")] = None
+    cylinder: Annotated[Cylinder | None, Field(description="cylinder with flat ends")] = None
+    box: Annotated[Box | None, Field(description="box in any position")] = None
     torus: Annotated[Torus | None, Field(description="a ring, or a bend of a pipe")] = None
     post: Annotated[Post | None, Field(description="an upright cylinder without ends")] = None
     prism: Annotated[Prism | None, Field(description="an upright prism without ends")] = None
@@ -96,7 +96,7 @@ class Source(Model):
     ] = None
     rotate: Annotated[
         tuple[Number, Number, Number],
-        Field(description="degrees about the axes x, then y, then z of the scene"),
+        Field(description="angles about the axes x, then y, then z of the scene, degrees"),
     ] = (0.0, 0.0, 0.0)
 
     @property
@@ -165,10 +165,10 @@ class Scene(FileModel):
 
     model_config = ConfigDict(title="netsp scene")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Name, Field(description="of the scene")] = "scene"
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    name: Annotated[Name, Field(description="name of the scene")] = "scene"
     units: Annotated[Name, Field(description="name of the unit of length")] = "m"
-    solids: Annotated[tuple[Solid, ...], Field(description="what stands in the water")] = ()
+    solids: Annotated[tuple[Solid, ...], Field(description="solids in the water")] = ()
     mesh: Annotated[Source | None, Field(description="a closed triangle mesh; null for none")] = (
         None
     )
@@ -179,7 +179,7 @@ class Scene(FileModel):
         Field(description="problem file whose obstacles stand upright in the water; null for none"),
     ] = None
     tether_radius: Annotated[
-        NonNegative, Field(description="by which all solids are grown for the tether, m")
+        NonNegative, Field(description="length by which all solids are grown for the tether, m")
     ] = 0.0
     bounds: Annotated[
         tuple[Number, Number, Number, Number, Number, Number] | None,

@@ -23,7 +23,7 @@ class Sphere(Model):
     """Ball."""
 
     center: Annotated[Point3, Field(description="(x, y, z), m")]
-    radius: Annotated[Positive, Field(description="m")]
+    radius: Annotated[Positive, Field(description="radius, m")]
 
     def row(self) -> SolidRow:
         """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
@@ -43,7 +43,7 @@ class Capsule(Model):
 
     a: Annotated[Point3, Field(description="(x, y, z) of one end of its axis, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the other end, m")]
-    radius: Annotated[Positive, Field(description="m")]
+    radius: Annotated[Positive, Field(description="radius, m")]
 
     def row(self) -> SolidRow:
         """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
@@ -63,7 +63,7 @@ class Cylinder(Model):
 
     a: Annotated[Point3, Field(description="(x, y, z) of the centre of one face, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the centre of the other, m")]
-    radius: Annotated[Positive, Field(description="m")]
+    radius: Annotated[Positive, Field(description="radius, m")]
 
     @model_validator(mode="after")
     def _long(self) -> Self:
@@ -101,7 +101,7 @@ class Box(Model):
         tuple[Positive, Positive, Positive], Field(description="full lengths of its edges, m")
     ]
     rotation: Annotated[
-        tuple[Number, Number, Number], Field(description="about x, then y, then z, degrees")
+        tuple[Number, Number, Number], Field(description="angles about x, then y, then z, degrees")
     ] = (0.0, 0.0, 0.0)
 
     def axes(self) -> Floats:
@@ -137,14 +137,16 @@ class Torus(Model):
         0.0,
         1.0,
     )
-    major_radius: Annotated[Positive, Field(description="of the circle that its tube follows, m")]
-    minor_radius: Annotated[Positive, Field(description="of the tube, m")]
+    major_radius: Annotated[
+        Positive, Field(description="radius of the circle that the tube follows, m")
+    ]
+    minor_radius: Annotated[Positive, Field(description="radius of the tube, m")]
     start: Annotated[
         Point3 | None, Field(description="direction (x, y, z) in which an open one begins")
     ] = None
     angle: Annotated[
         Annotated[float, Field(gt=0.0, le=360.0)],
-        Field(description="that it covers, degrees; 360 closes it"),
+        Field(description="angle of the ring that is solid, degrees; 360 closes it"),
     ] = 360.0
 
     @model_validator(mode="after")
@@ -205,7 +207,7 @@ class Post(Model):
     """Vertical cylinder without ends."""
 
     center: Annotated[Point2, Field(description="(x, y) of an upright post through all depths, m")]
-    radius: Annotated[Positive, Field(description="m")]
+    radius: Annotated[Positive, Field(description="radius, m")]
 
     def row(self) -> SolidRow:
         """Return the kind and the row for kernels (`netsp.world.scene.solids`)."""
@@ -228,7 +230,8 @@ class Prism(Model):
         Field(description="corners (x, y) of an upright prism through all depths, m"),
     ]
     grow: Annotated[
-        NonNegative, Field(description="by which it is grown, with rounded corners, m")
+        NonNegative,
+        Field(description="length by which the solid is grown, with rounded corners, m"),
     ] = 0.0
 
     @model_validator(mode="after")

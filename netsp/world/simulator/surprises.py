@@ -21,8 +21,8 @@ from netsp.world.simulator.timed_events import TimedEvent, check_in_turn
 class SolidMove(Model):
     """Move of a solid."""
 
-    solid: Annotated[Name, Field(description="its name")]
-    by: Annotated[Point3, Field(description="(x, y, z) to move it by, m")]
+    solid: Annotated[Name, Field(description="name of the solid")]
+    by: Annotated[Point3, Field(description="(x, y, z) by which the solid moves, m")]
 
 
 class SceneEvent(TimedEvent):
@@ -36,14 +36,14 @@ class SceneEvent(TimedEvent):
     vanish: Annotated[Name | None, Field(description="name of a solid that is gone")] = None
     move: Annotated[SolidMove | None, Field(description="a solid that moves")] = None
     add_waypoint: Annotated[
-        WaypointLike | None, Field(description="one more to visit: (x, y, z), m, or an object")
+        WaypointLike | None, Field(description="another waypoint: (x, y, z), m, or an object")
     ] = None
     cancel_waypoint: Annotated[
         Annotated[int, Field(ge=0)] | None,
         Field(description="number of a waypoint that need not be visited"),
     ] = None
     push: Annotated[
-        Point3 | None, Field(description="(x, y, z) by which the robot is carried off, m")
+        Point3 | None, Field(description="(x, y, z) by which the robot is displaced, m")
     ] = None
     tether_length: Annotated[
         Positive | None, Field(description="maximum length of the taut tether from now on, m")
@@ -67,8 +67,8 @@ class SceneSurprises(FileModel):
 
     model_config = ConfigDict(title="netsp scene surprises")
 
-    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    events: Annotated[tuple[SceneEvent, ...], Field(description="in any order")]
+    schema_version: Annotated[Literal[1], Field(description="version of the file format")] = 1
+    events: Annotated[tuple[SceneEvent, ...], Field(description="events in any order")]
 
     def by_time(self) -> list[SceneEvent]:
         """Return the events in order of time, and of the file if times are equal."""
