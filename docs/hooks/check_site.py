@@ -86,7 +86,9 @@ def main(site: Path) -> int:
         except Exception as error:
             print(f"check_site: no browser, nothing is checked: {str(error).splitlines()[0]}")
             return 0
-        for file in sorted(set(site.rglob("*.html")) - {site / "404.html"}):  # its links are absolute
+        for file in sorted(
+            set(site.rglob("*.html")) - {site / "404.html"}
+        ):  # its links are absolute
             name = file.relative_to(site)
             for check in (narrow, printed):
                 found += [f"{name}: {what}" for what in check(browser, file)]
