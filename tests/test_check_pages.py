@@ -76,7 +76,7 @@ def test_a_page_that_breaks_a_rule_is_found(check, before, after, complaint, tmp
 
 def test_an_entry_of_the_navigation_that_is_not_named_as_its_file_is_found(tmp_path):
     assert found("navigation", tmp_path, title="Flight") == [
-        "'Flight' has not all words of guide/fly-it.md",
+        "'Flight' has no word of guide/fly-it.md",
         "'Flight' is headed 'Fly it' in guide/fly-it.md",
     ]
 
