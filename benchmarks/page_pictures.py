@@ -34,7 +34,8 @@ MIN_BYTES = 100_000  # of a picture that gets a palette: smaller ones keep all o
 def save_small(picture: Path, target: Path) -> None:
     """Write a picture as a PNG with a palette, which takes about a third of the space."""
     image = Image.open(picture).convert("RGB")
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+    palette = Image.Quantize.MAXCOVERAGE  # keeps rare colours, as that of the robot
+    image.quantize(COLOURS, palette, dither=Image.Dither.NONE).save(target, optimize=True)
 
 
 def run_netsp(*words: str, folder: Path) -> None:
