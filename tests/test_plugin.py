@@ -343,6 +343,24 @@ def test_a_vehicle_may_be_a_class_of_ones_own():
     assert run.summary["inspection_s"] < 1.0
 
 
+def test_two_planners_are_compared_one_of_them_by_its_module(tmp_path, monkeypatch, capsys):
+    (tmp_path / "planner_here.py").write_text(
+        "from netsp.world.planner import Planner\nclass Own(Planner):\n    name = 'own'\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [p for p in sys.path if p])
+    Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]}).save("scene.json")
+    Mission(
+        scene="scene.json", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
+        waypoints=[(-2, 1, 0)], speed=0.5,
+    ).save("mission.json")  # fmt: skip
+    fly = ["simulate", "mission.json", "--planner", "none", "-o", "run", "--quiet", "--compare"]
+    assert main([*fly, "planner_here:Own"]) == 0
+    assert (tmp_path / "run" / "planner_here.Own" / "log.csv").exists()
+    assert main([*fly, "nobody"]) == 2
+    assert "unknown 'nobody'; expected one of predictive" in capsys.readouterr().err
+
+
 READER = """
 import shapely
 from netsp.exchange.maps.feature import Feature, Map

@@ -131,7 +131,7 @@ def _flown(
     if args.output is not None:
         write_run(runs[0], args.output)
         if len(runs) > 1:
-            write_run(runs[1], Path(args.output) / runs[1].planner)
+            write_run(runs[1], Path(args.output) / runs[1].planner.replace(":", "."))
         draw_runs(runs, runs[0].scene or scene, Path(args.output))
     return runs
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
+from netsp.base.errors import EXIT_DEFECT, EXIT_NOT_ALL
 from netsp.command.types import vector
 
 
@@ -14,7 +14,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.world.mission.mission import Mission
     from netsp.world.mission.mission_limits import check_names
     from netsp.world.paths.refine import RefineParams
-    from netsp.world.planner import PLANNERS, PlannerOptions
+    from netsp.world.planner import PlannerOptions
 
     changes: dict[str, object] = {}
     if args.tether is not None:
@@ -23,8 +23,8 @@ def run(args: argparse.Namespace) -> int:
         changes["current"] = vector(args.current, "--current")
     mission = Mission.load(args.mission).model_copy(update=changes)
     check_names(args.planner, args.vehicle, args.tether_model)
-    if args.compare is not None and args.compare not in PLANNERS:
-        raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
+    if args.compare is not None:
+        check_names(args.compare, args.vehicle, args.tether_model)
     refinement = RefineParams(keeps=args.perturbation)
     runs = fly(
         mission,
