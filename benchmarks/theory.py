@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Circle as PlotCircle
 
 from netsp import Circle, Polygon, Problem, solve
 from netsp.base.geometry import polylines
@@ -331,9 +333,80 @@ def branches() -> Any:
     return figure
 
 
+def shape() -> Any:
+    """Draw a taut path around grown polygons: where it bends, and where it does not."""
+    hook = [(2.0, 0.0), (7.0, 0.0), (7.0, 3.0), (5.6, 3.0), (5.6, 1.2), (3.4, 1.2), (3.4, 2.2),
+            (2.0, 2.2)]  # fmt: skip
+    problem = Problem(
+        base=(0.0, 0.4), goals=[(9.6, 1.2)], tether_length=16, clearance=0.5,
+        obstacles=[Polygon(polygon=hook), Circle(center=(8.6, 3.4), radius=0.6)],
+    )  # fmt: skip
+    paths = TautPaths(problem)
+    word = (1,)
+    tether = paths.tether(0, word)
+    corners = np.array(hook)
+    figure = Figure(figsize=(8.0, 4.0), layout="constrained")
+    ax = figure.subplots()
+    draw_obstacles(ax, problem)
+    for k, corner in enumerate(corners):
+        before, after = corner - corners[k - 1], corners[(k + 1) % len(corners)] - corner
+        if before[0] * after[1] - before[1] * after[0] > 0:
+            ax.add_artist(PlotCircle(corner, 0.5, fill=False, color=style.EDGE, lw=0.8, ls=":"))
+        else:
+            ax.plot(*corner, "x", ms=7, color=style.EDGE, zorder=6)
+    ax.plot(*tether.T[:2], color=style.TETHER, lw=1.8, zorder=5, label="taut path")
+    turns = distances_to_corners(tether, corners)
+    assert min(turns) > 0.5 - 1e-6
+    assert np.count_nonzero(np.array(turns) < 0.5 + 1e-3) == 3
+    ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=7)
+    ax.plot(*problem.goals[0].position[:2], "o", color=style.GOAL, mec=style.PATH, zorder=6)
+    finish(ax, "", (-0.8, 10.4, -1.0, 4.9))
+    handles = [
+        Line2D([], [], color=style.TETHER, lw=1.8, label="taut path"),
+        Line2D([], [], color=style.EDGE, lw=0.8, ls=":", label="arcs of convex vertices"),
+        Line2D([], [], color=style.EDGE, lw=0, marker="x", label="reflex vertex: no bend"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def distances_to_corners(path: Any, corners: Any) -> list[float]:
+    """Return the distance of each corner from a path."""
+    line = shapely.LineString(np.asarray(path)[:, :2])
+    return [float(line.distance(shapely.Point(corner))) for corner in corners]
+
+
+def ring() -> Any:
+    """Draw the shortest tour over the goals of a ring, which goes around, and the shortest tour."""
+    angles = 2.0 * np.pi * np.arange(7) / 7
+    places = 16.0 * np.column_stack([np.cos(angles), np.sin(angles)])
+    problem = Problem(
+        base=tuple(places[0]), goals=[tuple(p) for p in places[1:]], tether_length=200.0,
+        obstacles=[Circle(center=(0.0, 0.0), radius=10.0)],
+    )  # fmt: skip
+    best = solve(problem)
+    around = np.vstack([places, places[:1]])
+    words = (signature(around, problem.representative_points), ())
+    assert len(words[0]) == 1
+    figure, axes = panels(2, 8.6, 4.6)
+    lengths = (polylines.length(around), float(best.length or 0.0))
+    for ax, path, length, word, name in zip(
+        axes, (around, np.array(best.path)), lengths, words, ("one sheet", "two sheets"),
+        strict=True,
+    ):  # fmt: skip
+        draw_obstacles(ax, problem)
+        draw_rays(ax, problem, 21.0)
+        ax.plot(*path.T[:2], color=style.PATH, lw=1.5, zorder=4)
+        draw_letters(ax, path, problem.representative_points)
+        ax.plot(*places[1:].T, "o", ms=5, color=style.GOAL, mec=style.PATH, zorder=5)
+        ax.plot(*places[0], "*", color=style.BASE, ms=11, zorder=7)
+        finish(ax, f"{name}: {length:.1f} m, word {told(word)}", (-21, 21, -21, 21))
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Any]] = {
     "words": words, "limit": limit, "pending": pending, "slits": slits, "spiral": spiral,
-    "branches": branches,
+    "branches": branches, "shape": shape, "ring": ring,
 }  # fmt: skip
 
 

@@ -105,7 +105,7 @@ def test_every_real_problem_is_proven_and_verified(path):
         assert math.isclose(again.length, solution.length, rel_tol=2e-6)
 
 
-def test_the_shortest_tour_of_the_double_spiral_winds_its_tether_twice():
+def test_the_shortest_tour_of_the_double_spiral_needs_a_looping_class():
     """The non-looping rule of 2017 can cost the optimum: Proposition 10 of docs/theory."""
     problem = Problem.load(KNOWN / "double-spiral.json")
     shortest = solve(problem)
