@@ -28,13 +28,14 @@ READ = {
     "filter rejects the fixes",
     "GPS_RAW_INT": "whether the GPS has a fix, and repeats itself",
     "SYS_STATUS": "whether GPS, DVL, optical flow or visual odometry are healthy",
-    "WINCH_STATUS": "length of tether that the winch has let out; longer classes are excluded",
-    "GPS_GLOBAL_ORIGIN": "where the vehicle's estimate began, to read echoes of targets",
-    "POSITION_TARGET_LOCAL_NED": "the target that the vehicle has accepted",
-    "POSITION_TARGET_GLOBAL_INT": "the target that the vehicle has accepted",
-    "PARAM_VALUE": "what the vehicle does without a ground station",
-    "STATUSTEXT": "what the vehicle says; printed",
-    "COMMAND_ACK": "whether the vehicle refuses other message rates",
+    "WINCH_STATUS": "`guard`: length of tether that the winch has let out; it excludes longer "
+    "classes",
+    "GPS_GLOBAL_ORIGIN": "`fly`: where the vehicle's estimate began, to read echoes of targets",
+    "POSITION_TARGET_LOCAL_NED": "`fly`: the target that the vehicle has accepted",
+    "POSITION_TARGET_GLOBAL_INT": "`fly`: the target that the vehicle has accepted",
+    "PARAM_VALUE": "`fly`: what the vehicle does without a ground station",
+    "STATUSTEXT": "`fly`: what the vehicle says; printed",
+    "COMMAND_ACK": "`guard --ask-rates`: whether the vehicle refuses other message rates",
 }
 """Meanings of the messages that are read."""
 
