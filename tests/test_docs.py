@@ -151,3 +151,16 @@ def test_the_table_of_mavlink_messages_names_all_that_the_code_uses():
 
 def test_every_page_has_what_it_shows():
     assert sum(1 for page in PAGES for _ in blocks(page)) >= 10
+
+
+def test_every_option_of_a_solver_says_what_it_is():
+    done = subprocess.run(
+        [sys.executable, "docs/hooks/solver_options.py"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rows = [line for line in done.stdout.splitlines() if line.startswith("| `")]
+    assert len(rows) > 100
+    assert [row for row in rows if row.endswith("|  |")] == []

@@ -27,6 +27,7 @@ import licences  # noqa: E402
 import mavlink  # noqa: E402
 import modules  # noqa: E402
 import policies  # noqa: E402
+import solver_options  # noqa: E402
 
 GENERATED: dict[str, Callable[[], list[str]]] = {
     "<!-- alarms -->": policies.alarms,
@@ -38,6 +39,8 @@ GENERATED: dict[str, Callable[[], list[str]]] = {
     "<!-- licences -->": licences.table,
     "<!-- mavlink -->": mavlink.table,
     "<!-- modules -->": modules.module_list,
+    "<!-- solver options -->": solver_options.options,
+    "<!-- solver policies -->": solver_options.policy_options,
     "<!-- tolerances -->": modules.tolerances,
 }
 """Markers in pages, and the functions whose lines replace them."""

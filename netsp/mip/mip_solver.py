@@ -62,7 +62,7 @@ class Params:
     Attributes
     ----------
     backend
-        One of `BACKENDS`.
+        ``highs``, with branch and cut, or ``cbc``, with rounds of an integer program.
     search_rounds
         Rounds of ruin and recreate at the start, and again after the root.
     policy
