@@ -79,6 +79,9 @@ def main(site: Path) -> int:
         print("check_site: playwright is not installed (extra test): nothing is checked")
         return 0
     found = []
+    if not (site / "index.html").exists():
+        print(f"check_site: no site in {site}")
+        return 1
     with sync_playwright() as play:
         chromium = shutil.which("chromium") or shutil.which("chromium-browser")
         try:
