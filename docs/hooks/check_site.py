@@ -97,7 +97,8 @@ def main(site: Path) -> int:
                 found += [f"{name}: {what}" for what in check(browser, file)]
         found += [f"search: {what}" for what in searched(browser, site.resolve())]
         browser.close()
-    print("\n".join(found))
+    for what in found:
+        print(what)
     return 1 if found else 0
 
 
