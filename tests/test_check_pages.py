@@ -15,6 +15,7 @@ import check_pages  # noqa: E402
 import command_reference  # noqa: E402
 import format_reference  # noqa: E402
 
+from benchmarks import page_statistics  # noqa: E402
 from netsp.base import errors  # noqa: E402
 from netsp.model.bound_scope import Scope  # noqa: E402
 from netsp.model.solution import Status  # noqa: E402
@@ -126,6 +127,18 @@ def test_an_example_that_is_not_valid_is_found(monkeypatch):
     monkeypatch.setitem(format_reference.EXAMPLES, "problem", "scenes/basin.json")
     with pytest.raises(ValueError):
         format_reference.example("problem")
+
+
+def test_the_reading_ease_of_a_page_leaves_out_code_and_tables():
+    words = "The cat sat on the mat. The dog ran to the red house."
+    text = (
+        f"# Title\n\n{words}\n\n```sh\nnetsp incomprehensibility\n```\n\n| antidisestablishment |\n"
+    )
+    assert page_statistics.reading_ease(text) == page_statistics.reading_ease(words)
+    assert page_statistics.reading_ease(words) > 100
+    assert page_statistics.reading_ease("# Only a heading\n") is None
+    counts = {"tether": 2, "base": 1, "pulled": 1, "visited": 3, "obstacle": 3, "way": 1}
+    assert {word: page_statistics.syllables(word) for word in counts} == counts
 
 
 def documented():
