@@ -75,6 +75,12 @@ def test_a_page_that_breaks_a_rule_is_found(check, before, after, complaint, tmp
     assert complaint in what
 
 
+def test_a_misspelling_that_codespell_knows_is_found(tmp_path):
+    pytest.importorskip("codespell_lib")
+    (what,) = found("spelling", tmp_path, GOOD.replace("Connect", "Recieve"))
+    assert what == "Recieve ==> Receive"
+
+
 def test_an_entry_of_the_navigation_that_is_not_named_as_its_file_is_found(tmp_path):
     assert found("navigation", tmp_path, title="Flight") == [
         "'Flight' has no word of guide/fly-it.md",

@@ -120,8 +120,10 @@ def spelling(root: Path = ROOT) -> Iterator[Found]:
         text=True,
         check=False,
     )
+    if done.returncode not in (0, 65):  # none found, some found
+        raise RuntimeError(f"codespell ended with {done.returncode}: {done.stderr.strip()[-300:]}")
     for row in done.stdout.splitlines():
-        file, number, what = row.split(":", 2)
+        file, number, what = row.rsplit(":", 2)
         yield Path(file).relative_to(root).as_posix(), int(number), what.strip()
 
 
