@@ -64,6 +64,17 @@ def test_rows_from_north_to_south_and_the_origin_are_heeded(tmp_path):
     assert deep[: z.size, 2] == pytest.approx(-top[:, 2])
 
 
+@pytest.mark.parametrize("depths", [None, True, False])
+def test_the_depths_of_a_table_are_turned_once(depths, tmp_path):
+    """A column named `depth` counts downwards; setting `depths` says the same or the opposite."""
+    file = tmp_path / "d.csv"
+    file.write_text("x,y,depth\n0,0,4\n1,0,5\n0,1,6\n1,1,7\n")
+    vertices, _, notes = load_floor(file, depths=depths)
+    turned = [4.0, 5.0, 6.0, 7.0] if depths is False else [-4.0, -5.0, -6.0, -7.0]
+    assert vertices[:4, 2].tolist() == turned
+    assert ("heights count downwards: converted to z upwards" in notes) == (depths is None)
+
+
 def test_the_mesh_of_a_floor_is_closed_and_points_outwards(tmp_path):
     trimesh = pytest.importorskip("trimesh")
     vertices, faces, _ = load_floor(write_asc(tmp_path / "z.asc", hill()))

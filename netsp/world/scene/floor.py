@@ -420,10 +420,11 @@ def _grid_of_table(path: str | Path, policy: FloorPolicy) -> _Grid:
     if len(np.unique(places)) != len(places):
         raise InputError(f"{path}: two rows for one cell; expected one height for each")
     z = np.full(len(x) * len(y), np.nan)
-    z[places] = cloud.points[:, 2]
+    # values as the table states them: `read_floor` turns depths
+    z[places] = -cloud.points[:, 2] if cloud.names_depths else cloud.points[:, 2]
     notes = list(cloud.notes)
     filled, gaps = _without_gaps(z.reshape(len(y), len(x)), path, notes)
-    return _Grid(x, y, filled, notes=tuple(notes), gaps=gaps)
+    return _Grid(x, y, filled, called_depth=cloud.names_depths, notes=tuple(notes), gaps=gaps)
 
 
 def _steps(

@@ -41,12 +41,15 @@ class PointCloud:
         Points, columns and classes that were left out, one line each.
     tally : Tally, optional
         Numbers of points used and left out; None if all are used.
+    names_depths : bool
+        Whether the file names its heights a depth: they are turned, z is upwards.
     """
 
     points: Floats = field(repr=False)
     metres: tuple[float, float, float] = (1.0, 1.0, 1.0)
     notes: tuple[str, ...] = ()
     tally: Tally | None = None
+    names_depths: bool = False
 
 
 class SurfaceFilter:
@@ -143,7 +146,12 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     if unused := table.left_out((*used, "classification", "withheld")):
         notes.append(f"unused columns: {', '.join(unused)}")
     tally = surface.tally([("without coordinates", gaps)] if gaps else [])
-    return PointCloud(points[surface.kept], notes=tuple(notes), tally=tally)
+    return PointCloud(
+        points[surface.kept],
+        notes=tuple(notes),
+        tally=tally,
+        names_depths=table.columns[up][1].factor < 0.0,
+    )
 
 
 def coordinate_fields(
