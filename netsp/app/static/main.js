@@ -70,9 +70,16 @@ function heard(message) {
     page.chosen = page.chosen.filter(([list, k]) => list === "base" || k < (page.data[list] ?? []).length);
     view.heading = page.data.origin ? page.data.origin.heading ?? 0 : undefined;
     if (!fitted && !space.open) { fitted = true; view.fit(page.data); }
+    page.wrong = whatIsWrong();
     fill(page);
   }
-  if (message.tour) { page.tour = message.tour; page.fresh = true; showAlong(); fill(page); }
+  if (message.tour) {
+    page.tour = message.tour;
+    page.fresh = true;
+    page.wrong = whatIsWrong();
+    showAlong();
+    fill(page);
+  }
   if (message.drawn_points) page.drawn.take(message.drawn_points, message.by);
   if (message.facts) { page.facts = message.facts; fill(page); mark(by("along").value / 1000); }
   redraw();
@@ -80,15 +87,22 @@ function heard(message) {
   say();
 }
 
+/** True before the first goal is drawn. */
+const isEmpty = () => !page.shown && !(page.data?.goals ?? []).length;
+
+/** Why this version has no tour, which the panel and the status line say. @returns {string | null} */
+function whatIsWrong() {
+  if (isEmpty()) return null;
+  return page.error ?? outOfReach() ?? (page.tour?.version === page.version ? page.tour?.error ?? null : null);
+}
+
 function say() {
   const tour = page.tour, answer = by("answer");
   by("name").textContent = `${page.data?.name ?? "netsp"}${page.saved ? "" : " *"}`;
   document.title = `${page.saved ? "" : "* "}${page.data?.name ?? "netsp"}`;
-  const empty = !page.shown && !(page.data?.goals ?? []).length;
-  const wrong = empty ? null : page.error ?? outOfReach() ?? (tour?.version === page.version ? tour?.error : null);
+  const wrong = page.wrong;
   answer.classList.toggle("bad", Boolean(wrong));
-  page.wrong = wrong;
-  if (empty) answer.textContent = "draw goals and obstacles, or open a file";
+  if (isEmpty()) answer.textContent = "draw goals and obstacles, or open a file";
   else if (wrong) answer.textContent = wrong;
   else if (page.run && tour) {
     const s = tour.summary;

@@ -38,6 +38,7 @@ function field(name, value, changed, kind = "number", good = () => true, expecte
 export function fill(page) {
   const panel = document.getElementById("panel");
   if (!panel || !page.data) return;
+  showReason(panel, page);
   const at = document.activeElement;
   if (at && panel.contains(at) && (at.matches("input") || at.closest(".classes"))) return;  // somebody is typing
   page.onchosen = () => fill(page);
@@ -58,7 +59,6 @@ export function fill(page) {
       field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v)), "number", (v) => v >= 0, "a distance of 0 or more"),
       field("base depth (m)", 0 - (data.base[2] ?? 0), (v) => set(["base"], [data.base[0], data.base[1], 0 - Number(v)])),
       ...bounds(data, set));
-    if (page.wrong) { const p = element("p", page.wrong); p.className = "bad"; parts.unshift(p); }
     for (const [list, k] of page.chosen.slice(0, 5)) parts.push(...chosen(page, list, k, set));
     if (page.chosen.some(([l]) => l !== "base")) parts.push(...copying(page));
   }
@@ -76,6 +76,20 @@ export function fill(page) {
   parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page), ...imported(page, set));
   if (!page.shown) parts.push(...origin(data, set));
   panel.replaceChildren(...parts);
+  showReason(panel, page);
+}
+
+/** Says at the top of the panel why there is no tour, also while somebody is typing.
+ * @param {HTMLElement} panel @param {any} page */
+function showReason(panel, page) {
+  const first = panel.firstElementChild;
+  const is = Boolean(first?.matches("p.bad")), text = page.shown ? null : page.wrong;
+  if (is && first?.textContent === text) return;
+  if (is) first?.remove();
+  if (!text) return;
+  const p = element("p", text);
+  p.className = "bad";
+  panel.prepend(p);
 }
 
 /** @param {string} text @param {boolean} disabled */
@@ -168,7 +182,11 @@ function origin(data, set) {
   const keep = (/** @type {any} */ change) => {
     const next = { heading: 0, ...o, ...pending, ...change };
     pending = next;
-    if (next.latitude !== undefined && next.longitude !== undefined) { pending = {}; set(["origin"], next); }
+    if (next.latitude !== undefined && next.longitude !== undefined) {
+      pending = {};
+      complain("");
+      set(["origin"], next);
+    }
     else complain(`position of the base: the ${next.latitude === undefined ? "latitude" : "longitude"} is needed, too`);
   };
   return [element("h2", "Position of the base"),
