@@ -29,8 +29,14 @@ def base_of(
     is_in_plane = not context.map.is_geographic
     if feature is None and (is_in_plane or context.projection is None):
         if not context.complaints:  # a damaged feature may be the base
-            hint = () if is_in_plane else (", or --base LAT,LON", "base")
-            context.complain("has no base; expected a Point of kind base", *hint)
+            if is_in_plane:
+                context.complain(
+                    "has no base; expected a Point of kind base, or a point on a layer named base",
+                    " (--map base=LAYER; on the earth also --crs SYSTEM with --base LAT,LON)",
+                )
+            else:
+                expected = "has no base; expected a Point of kind base"
+                context.complain(expected, ", or --base LAT,LON", "base")
         return None
     if is_in_plane:
         assert feature is not None
