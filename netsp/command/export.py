@@ -25,6 +25,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _problem(args: argparse.Namespace) -> int:
     """Write the solution of a problem."""
+    from netsp.base.files import read_text
     from netsp.exchange.maps.goal_depths import surface_warning
     from netsp.exchange.maps.projection import Projection
     from netsp.exchange.missions import mission_files
@@ -34,7 +35,10 @@ def _problem(args: argparse.Namespace) -> int:
     from netsp.exchange.missions.fence import FencePolicy
 
     if args.problem is None:
-        raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
+        read_text(args.solution)  # a file that cannot be read is refused by its own message
+        raise InputError(
+            f"{args.solution} is no planned mission; give the problem of a tour with --problem FILE"
+        )
     problem, solution = load_verified_pair(args.problem, args.solution)
     if args.depth is not None:
         problem, solution = at_depth(problem, solution, args.depth)
