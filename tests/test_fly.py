@@ -4,16 +4,20 @@ import functools
 import io
 import json
 import random
+import re
 import signal
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
 from netsp.base.errors import InputError
+from netsp.base.geometry import polylines
+from netsp.command.fly import way_home
 from netsp.command.main import main
 from netsp.online.execute.events import Surprises
 from netsp.online.execute.execution_log import ExecutionOptions
@@ -399,6 +403,37 @@ def test_a_dry_run_shows_every_target_and_needs_no_link(tmp_path, capsys, tour):
     solution.write_text(json.dumps(broken))
     assert main(["fly", str(problem), str(solution), "--dry-run"]) == 2
     assert main(["fly", str(problem), str(solution)]) == 2
+
+
+def test_an_address_that_is_none_is_refused_before_anything_is_said(tmp_path, tour, capsys):
+    problem, solution = tmp_path / "p.json", tmp_path / "s.json"
+    problem.write_text(SITE.to_json())
+    solution.write_text(tour.to_json())
+    assert main(["fly", str(problem), str(solution), "--link", "tcp:14550"]) == 2
+    err = capsys.readouterr().err
+    assert "--link: expected udpin:PORT" in err
+    assert "in still water" not in err
+
+
+def test_the_way_home_has_no_bends_within_a_share_of_the_clearance():
+    """A dozen corners of an arc around a pile stand for one bend or two."""
+    angles = np.linspace(0.0, np.pi / 2, 13)
+    arc = 5.0 + 0.9 * np.column_stack([np.sin(angles), np.cos(angles), np.zeros(13)])
+    tether = np.vstack([(0, 5.9, 0), arc, (5.9, 0, 0)])
+    done = SimpleNamespace(tethers=[(0.0, tether)], problem=SITE, options=ExecutionOptions())
+    waypoints = [
+        tuple(map(float, w.split(",")))
+        for w in re.findall(r"\(([^)]*)\)", way_home(done).split(" by ")[1])
+    ]
+    assert len(waypoints) < 8
+    assert waypoints[-1] == (0.0, 5.9, 0.0)
+    line = np.vstack([tether[-1], waypoints])
+    share = FlightPolicy().max_home_offset
+    rounding = 0.01
+    for place in tether:
+        assert polylines.distance(line, place) <= share * SITE.clearance + rounding
+    every = way_home(done, replace(FlightPolicy(), max_home_offset=1e-6))
+    assert every.count("(") == len(tether) - 1
 
 
 def test_a_tour_is_flown_by_command_with_events_and_its_files_are_written(

@@ -11,6 +11,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from netsp.base.errors import InputError
 from netsp.command.clearance_warning import warn_of_problem
 from netsp.command.types import load_verified_pair
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from netsp.model.solution import Solution
     from netsp.online.execute.events import Event, Surprises
     from netsp.online.execute.execution_log import Execution, ExecutionRow
+    from netsp.online.fly.flight_policy import FlightPolicy
     from netsp.online.fly.flight_time import FlightTime
     from netsp.online.fly.resume import BeginsAt
     from netsp.online.guard.guard_page import Page
@@ -36,8 +39,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
     from netsp.command.execute import checked_surprises
     from netsp.command.flight import exit_code
+    from netsp.online.link.address import Address
     from netsp.online.link.geo_frame import Frame
 
+    if args.link is not None:
+        Address.parse(args.link)
     problem, solution, begins = _inputs(args)
     surprises = checked_surprises(args, problem)
     if problem.units != "m":
@@ -331,14 +337,21 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
             print(f"{number:>6}  {cells}  {name if is_last else 'bend'}")
 
 
-def way_home(done: Execution) -> str:
-    """Return the path home, in the tether's class, from the last position of the vehicle."""
-    from netsp.base.geometry import polylines
+def way_home(done: Execution, policy: FlightPolicy | None = None) -> str:
+    """Return the path home, in the tether's class, from the last position of the vehicle.
 
-    line = done.tethers[-1][1][::-1]
-    bends = ", ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in line[1:])
-    seconds_home = polylines.length(line) / done.options.speed
+    Waypoints without which the path stays within a share of the clearance from the tether are left
+    out.
+    """
+    from netsp.base.geometry import polylines
+    from netsp.online.fly.flight_policy import FlightPolicy
+
+    policy = policy or FlightPolicy()
+    line = np.asarray(done.tethers[-1][1], dtype=float)[::-1]
+    length = polylines.length(line)
+    kept = polylines.essential(line, policy.max_home_offset * done.problem.clearance)
+    bends = ", ".join(f"({x:.2f}, {y:.2f}, {z:.2f})" for x, y, z in line[kept][1:])
     return (
-        f"home     back along the tether: {polylines.length(line):.1f} {done.problem.units}, "
-        f"{seconds_home:.0f} s, by {bends}"
+        f"home     back along the tether: {length:.1f} {done.problem.units}, "
+        f"{length / done.options.speed:.0f} s, by {bends}"
     )

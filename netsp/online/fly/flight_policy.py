@@ -61,6 +61,10 @@ class FlightPolicy:
     max_unwatched_distance
         Largest straight distance between the last recorded place and the place where a flight is
         resumed, m: on a longer one the vehicle may have passed an obstacle on either side.
+    max_home_offset
+        Largest distance of the taut tether from the line between the waypoints home that are
+        printed when a pilot takes over, as a share of the clearance: arcs around obstacles have a
+        dozen corners within centimetres.
     min_class_odds
         Minimum ratio of the likelihoods of the likeliest and the next class in the state file of a
         guard.
@@ -112,6 +116,7 @@ class FlightPolicy:
     min_approach: float = 0.1
     max_depth_step: float = 2.0
     max_unwatched_distance: float = 10.0
+    max_home_offset: float = 0.1
     min_class_odds: float = 100.0
     retry_s: float = 0.5
     notice_s: float = 0.1
