@@ -25,6 +25,7 @@ from netsp import Circle, Polygon, Problem
 from netsp.base.errors import InputError
 from netsp.command.main import main
 from netsp.hsignature import concatenate, crossings, signature
+from netsp.model.problem import Origin
 from netsp.model.solution import Solution
 from netsp.online.guard.alarms import Alarm, Alarms, Level
 from netsp.online.guard.belief import Belief
@@ -472,6 +473,23 @@ def test_alarms_do_not_flicker():
     assert not alarms.active
 
 
+def test_of_a_loop_ahead_and_the_same_loop_closed_the_graver_is_shown():
+    ahead = Alarm("loop-ahead", Level.WARNING, "in 1 s", around=(0,))
+    closed = Alarm("loop", Level.ALARM, "closed", around=(0,))
+    other = replace(closed, around=(0, 1))
+    alarms = Alarms()
+    alarms.update(0.0, [ahead])
+    assert [a.kind for a in alarms.update(0.6, [ahead])] == ["loop-ahead"]
+    assert [a.kind for a in alarms.update(0.7, [ahead, closed])] == ["loop"]
+    assert set(alarms.active) == {"loop-ahead"}  # closed for less than 0.3 s: a notice
+    alarms.update(1.1, [ahead, closed])
+    assert set(alarms.active) == {"loop"}
+    alarms.update(1.2, [closed])  # the loop ahead is lowered after 4 s only
+    assert set(alarms.active) == {"loop"}
+    alarms.update(1.3, [ahead, other])
+    assert set(alarms.active) == {"loop-ahead", "loop"}
+
+
 # from one run to the next
 
 
@@ -607,9 +625,10 @@ def test_the_page_is_for_who_has_the_token_and_takes_corrections_only():
         for name in ("", "page.js", "page.css"):
             assert ask(f"/{page.token}/{name}")[0] == 200
         assert ask(f"/{page.token}/../pyproject.toml")[0] == 404
-        said = json.dumps({"side": "south", "obstacle": "A"})
+        assert json.loads(data)["sides"] == ["+y", "+x", "−y", "−x"]  # the words of alarms
+        said = json.dumps({"side": "−y", "obstacle": "A"})
         assert ask(f"/{page.token}/correct", "POST", said)[0] == 200
-        assert page.corrections.get_nowait() == ("south", "A")
+        assert page.corrections.get_nowait() == ("−y", "A")
         assert ask(f"/{page.token}/correct", "POST", said, Origin="http://evil.example")[0] == 400
         for bad in (
             "",
@@ -620,6 +639,19 @@ def test_the_page_is_for_who_has_the_token_and_takes_corrections_only():
         ):
             assert ask(f"/{page.token}/correct", "POST", bad)[0] in (400, 404)
         assert ask(f"/{page.token}/event", "POST", "{}")[0] == 404
+
+
+def test_a_correction_has_the_words_of_alarms():
+    """A site with an origin has compass points, others axes; both are understood."""
+    placed = SITE.model_copy(update={"origin": Origin(latitude=54.0, longitude=12.0)})
+    assert PlaneWorld(placed).sides == ("north", "east", "south", "west")
+    assert PlaneWorld(SITE).sides == ("+y", "+x", "−y", "−x")
+    over = np.array([(0, 0), (5, 2), (9, 0)], dtype=float)
+    for site in (SITE, placed):
+        north = PlaneWorld(site).passes_on_side(over, "north", "A")
+        assert north == PlaneWorld(site).passes_on_side(over, "+y", "A")
+    with pytest.raises(InputError, match=r"expected one of \+y, \+x, −y, −x, got 'up'"):
+        PlaneWorld(SITE).passes_on_side(over, "up", "A")
 
 
 def test_a_guard_asks_for_a_link_or_a_recording(capsys):

@@ -174,7 +174,7 @@ def test_a_position_that_jumps_when_fixes_are_taken_again_is_told():
         why = "the filter rejects the fixes" if 3.0 <= t < 10.0 else ""
         place = (0.2 * t, 4.8 if t >= 10.0 else 0.0, -1.0)
         report = guard.update(Fix(t, place, estimate=True, aiding_fault=why))
-    assert any("set anew, 4.8 m" in a.text for a in report.alarms)
+    assert any("reset to a place 4.8 m away" in a.text for a in report.alarms)
 
 
 def test_policies_out_of_range_are_refused():

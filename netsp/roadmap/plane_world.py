@@ -18,7 +18,15 @@ from netsp.hsignature.words import invert, least_changed
 from netsp.model.problem import Circle, Problem
 from netsp.roadmap.tether_classes import Tethers
 from netsp.world.scene.scene import scene_of
-from netsp.world.side_names import SIDES, crosses_ray, listed, passages, side, side_direction
+from netsp.world.side_names import (
+    AXIS_SIDES,
+    SIDES,
+    crosses_ray,
+    listed,
+    passages,
+    side,
+    side_direction,
+)
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.resolution import suggested_delta
 from netsp.world.world_policy import WorldPolicy
@@ -84,7 +92,6 @@ class PlaneWorld:
         Limits of searches.
     """
 
-    sides: tuple[str, ...] = tuple(SIDES)
     is_planar = True
 
     def __init__(
@@ -97,6 +104,7 @@ class PlaneWorld:
         self.problem = problem
         self.policy, self._start_tether = policy, start_tether
         self.name, self.units = problem.name, problem.units
+        self.sides: tuple[str, ...] = tuple(SIDES if problem.origin else AXIS_SIDES)
         self.tether_length = problem.tether_length
         self.anchor = np.asarray(problem.base, dtype=float)
         state = problem.state

@@ -25,6 +25,9 @@ AXES = ("+y", "+x +y", "+x", "+x −y", "−y", "−x −y", "−x", "−x +y")
 SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
 """Index of each side in `WINDS` and in `AXES`."""
 
+AXIS_SIDES = {AXES[k]: k for k in SIDES.values()}
+"""Index of each side in `AXES`, where north is not known."""
+
 ARC_TOLERANCE = 2e-3
 """Tolerance of touching, as a share of the size of an obstacle: the corners of polylines that stand
 for arcs lie this far from the arc."""
@@ -62,11 +65,12 @@ def side_direction(problem: Problem, side: str) -> Floats:
     Raises
     ------
     InputError
-        The side is none of `SIDES`, nor of `AXES`, which are for sites whose north is unknown.
+        The side is none of `SIDES`, nor of `AXIS_SIDES`.
     """
-    names = {**SIDES, **{AXES[k]: k for k in range(0, 8, 2)}}
+    names = {**SIDES, **AXIS_SIDES}
     if not isinstance(side, str) or side not in names:
-        raise InputError(f"side: expected north, east, south or west, got {side!r}")
+        expected = ", ".join(SIDES if problem.origin else AXIS_SIDES)
+        raise InputError(f"side: expected one of {expected}, got {side!r}")
     heading = problem.origin.heading if problem.origin else 0.0
     angle = np.radians(45.0 * names[side] - heading)
     return np.array([np.sin(angle), np.cos(angle)])

@@ -65,7 +65,7 @@ class World(Protocol):
     """Free space."""
     model: GeodesicTether
     sides: tuple[str, ...]
-    """Sides of obstacles, as operators may name them."""
+    """Sides of obstacles, in the words of alarms."""
 
     @property
     def policy(self) -> WorldPolicy:

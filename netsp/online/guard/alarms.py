@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -32,12 +32,15 @@ class Alarm:
         One or two sentences: the reason, and what to do.
     is_immediate
         Whether the alarm is raised at once, without waiting for its reason to last.
+    around
+        Indices of the obstacles of the loop, for alarms about loops.
     """
 
     kind: str
     level: Level
     text: str
     is_immediate: bool = False
+    around: tuple[int, ...] = ()
 
 
 @dataclass
@@ -77,7 +80,9 @@ class _AlarmState:
     ) -> list[Alarm]:
         """Raise or lower the alarm to a level, and return it if it was raised."""
         old = None if self.shown is None else self.shown.level
-        new = None if level is None or reason is None else Alarm(reason.kind, level, reason.text)
+        new = None
+        if level is not None and reason is not None:
+            new = Alarm(reason.kind, level, reason.text, around=reason.around)
         if new is not None and (old is None or new.level >= old):
             self.shown, self.last = new, now
             return [new] if old is None or new.level > old else []
@@ -109,6 +114,11 @@ class Alarms:
         -------
         list of Alarm
             Alarms that were raised to a higher level, the gravest first.
+
+        Notes
+        -----
+        Of a loop that is closed and the same loop ahead only the graver alarm is active: the loop
+        ahead is known from a look before the loop closed.
         """
         by_kind = {a.kind: a for a in reasons}
         raised = []
@@ -119,4 +129,18 @@ class Alarms:
         self.active = {
             k: state.shown for k, state in self._states.items() if state.shown is not None
         }
+        repeated = _repeated_loop(self.active)
+        if repeated is not None:
+            del self.active[repeated]
+        if repeated == "loop-ahead":
+            raised = [a for a in raised if a.kind != repeated]
         return sorted(raised, key=lambda a: -a.level)
+
+
+def _repeated_loop(active: Mapping[str, Alarm]) -> str | None:
+    """Return the less grave of two active alarms about one loop, ahead and closed, by its kind; of
+    two equal ones the loop ahead; None if there are no two."""
+    ahead, closed = active.get("loop-ahead"), active.get("loop")
+    if ahead is None or closed is None or not closed.around or ahead.around != closed.around:
+        return None
+    return "loop-ahead" if closed.level >= ahead.level else "loop"

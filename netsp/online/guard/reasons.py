@@ -86,7 +86,7 @@ def uncorrected(seconds: float, why: str, error: float, units: str) -> Alarm:
 def position_reset(far: float, units: str) -> Alarm:
     """Return the alarm that the filter reset the position when it took fixes again."""
     text = (
-        f"the position was set anew, {far:.1f} {units} from where it was: it was off, or the fixes "
+        f"the position was reset to a place {far:.1f} {units} away: it was off, or the fixes "
         "are; say on which side of obstacles the tether passes, or go back along it"
     )
     return Alarm("position", Level.WARNING, text, is_immediate=True)
@@ -106,7 +106,7 @@ def off_plan(
     """Return the caution that the tether is in another class than planned at this visit, if so."""
     if as_planned is not False or now.likely < policy.likely_share:
         return []
-    text = f"the tether is not as planned at this stop: it runs {now.passes}"
+    text = f"the tether is not as planned at this visit: it runs {now.passes}"
     return [Alarm("plan", Level.CAUTION, text)]
 
 
@@ -162,7 +162,7 @@ def loop_ahead(ahead: LookaheadResult, situation: Situation, share: float = 1.0)
         f"keep {beside(keep, site.name_of(near))}: going on closes a loop around {names} in "
         f"{ahead.loop_s:.0f} s{_likelihood(share, policy)}; {_undo(site, ahead.loop, near)}"
     )
-    return [Alarm("loop-ahead", level, text)]
+    return [Alarm("loop-ahead", level, text, around=ahead.loop.around)]
 
 
 def _loop_ahead_level(
@@ -194,10 +194,11 @@ def loop_closed(loops: Sequence[Loop], situation: Situation, share: float = 1.0)
     names, likelihood = names_of(site, loop.around, policy.max_names), _likelihood(share, policy)
     text = f"a loop around {names} is closed{likelihood}"
     if situation.is_on_plan:
-        text += "; the tether was as planned at the last stop"
-        return [Alarm("loop", Level.NOTICE, text)]
+        text += "; the tether was as planned at the last visit"
+        return [Alarm("loop", Level.NOTICE, text, around=loop.around)]
     level = Level.ALARM if share >= policy.loop_alarm_share else Level.CAUTION
-    return [Alarm("loop", level, f"{text}; {_undo(site, loop, near)}")]
+    undo = _undo(site, loop, near)
+    return [Alarm("loop", level, f"{text}; {undo}", around=loop.around)]
 
 
 def _likelihood(share: float, policy: AlarmPolicy = AlarmPolicy()) -> str:

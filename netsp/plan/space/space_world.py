@@ -30,14 +30,17 @@ from netsp.world.world_policy import WorldPolicy
 from netsp.world.world_protocol import Letters
 
 DIRECTIONS = {
-    "north": ("+y", "−y"),
-    "east": ("+x", "−x"),
-    "south": ("−y", "+y"),
-    "west": ("−x", "+x"),
+    "+y": ("+y", "−y"),
+    "+x": ("+x", "−x"),
+    "−y": ("−y", "+y"),
+    "−x": ("−x", "+x"),
     "above": ("above", "below"),
     "below": ("below", "above"),
 }
 """Direction that each side means, and its opposite."""
+
+WINDS = {"north": "+y", "east": "+x", "south": "−y", "west": "−x"}
+"""Sides that are understood, too: missions do not say where north is, so it is the y axis."""
 
 PUSH_OUT_DISTANCE = 1e-6
 """Tolerance to which places are moved out of solids, m."""
@@ -286,7 +289,8 @@ class SpaceWorld:
 
     def passes_on_side(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
         """Return whether a tether comes nearest to a solid on one side, not on the opposite one."""
-        if side not in self.sides:
+        side = WINDS.get(side, side)
+        if side not in DIRECTIONS:
             raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
         solid_field = self._field_of(self._index(obstacle))
         places = polylines.dense(nodes, 0.5 * self.model.delta)
