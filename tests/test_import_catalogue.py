@@ -260,6 +260,12 @@ def test_all_pieces_of_a_cropped_outline_are_counted_as_left_out(tmp_path):
     assert [group.features for group in layer.left_out] == [4]
 
 
+def test_a_layer_that_a_map_without_layers_lacks_is_named_as_typed(tmp_path):
+    file = geojson(tmp_path, sides(square(0)))
+    with pytest.raises(InputError, match=r"the map has no layers; expected one of .*, got 'FOO'$"):
+        import_site(file, options=SiteOptions(tether=60.0, maps=(("goal", "FOO"),)))
+
+
 def test_the_other_names_of_a_joined_outline_are_told(tmp_path):
     found = import_site(geojson(tmp_path, sides(square(0))), options=SiteOptions(tether=60.0))
     (obstacle,) = found.problem.obstacles

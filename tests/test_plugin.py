@@ -270,6 +270,23 @@ def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     assert len(seen) > 10
 
 
+def test_an_error_of_a_planner_of_ones_own_is_not_put_down_to_netsp():
+    class Broken(Planner):
+        name = "broken"
+
+        def plan(self, robot, tether):
+            raise ZeroDivisionError("mine")
+
+    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]})
+    mission = Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
+        waypoints=[(-2, 1, 0)], speed=0.5,
+    )  # fmt: skip
+    run = simulate(mission, Broken, scene=scene)
+    (left,) = run.summary["left_out"]
+    assert left["reason"] == "a defect of planner 'broken' ended planning (ZeroDivisionError: mine)"
+
+
 def nearest_classes(problem, *, count: int = 2, seed: int = -1):
     """Return the travel graph of the classes with the shortest tethers."""
     graph = travel_graph(problem)

@@ -13,12 +13,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from netsp.base.compiled import disk_cache, dynamic_array
+from netsp.base.compiled import disk_cache, dynamic_array, numba_loading
 from netsp.base.compiled.compile_policy import compiles, current_policy
 from netsp.base.compiled.kernel import all_kernels
-from netsp.base.errors import InputError
+from netsp.base.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.command import compiling, main, warm_up
-from netsp.command.compiling import CompileTimes, Preparation, PreparationPolicy
+from netsp.command.compiling import CompileTimes, Preparation, PreparationPolicy, compile_messages
 from netsp.command.status_line import StatusLine, status_line
 
 ROOT = Path(__file__).parent.parent
@@ -49,6 +49,32 @@ def test_one_line_is_written_however_many_kernels_are_compiled():
     preparation.close()
     (line,) = stream.getvalue().splitlines()
     assert re.fullmatch(r"preparing the solver, about \d+ s, once per installation", line)
+
+
+def test_a_time_limit_that_compiling_has_used_up_says_so(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(compiling.time, "monotonic", lambda: clock[0])
+    kernel = _kernel("netsp.world.tether.pull")
+
+    def error_after(seconds, error):
+        def listen(begin, end):
+            begin(kernel)
+            clock[0] += seconds
+            return contextlib.nullcontext()
+
+        monkeypatch.setattr(compiling, "_listening", listen)
+        monkeypatch.setattr(numba_loading, "when_numba_is_loaded", lambda then: then())
+        with pytest.raises(LimitReachedError) as caught, compile_messages(io.StringIO()):
+            raise error
+        return str(caught.value)
+
+    limit = LimitReachedError("time limit reached while laying the tether")
+    said = error_after(12.0, limit)
+    assert said.startswith(f"{limit}; compiling took 12 s of it")
+    assert said.endswith("run the command again, or run `netsp warm-up` first")
+    assert error_after(0.2, limit) == str(limit)
+    memory = MemoryLimitError("too much")
+    assert error_after(12.0, memory) == "too much"
 
 
 def test_without_a_terminal_another_line_is_written_every_half_minute(monkeypatch):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.base.errors import LimitReachedError
 from netsp.base.number_ranges import check_positive
 
 if TYPE_CHECKING:
@@ -28,8 +29,12 @@ PACKAGE_SUBJECTS = {
 
 
 @contextmanager
-def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator[None]:
+def compile_messages(
+    stream: TextIO, line: StatusLine | None = None, policy: PreparationPolicy | None = None
+) -> Iterator[None]:
     """Show, while the body runs, what is being compiled and about how long it takes.
+
+    If compiling took the time of a limit that ends the body, the error says so.
 
     Parameters
     ----------
@@ -37,10 +42,17 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
         Stream for messages, such as stderr.
     line : StatusLine, optional
         Line of a terminal, in which a bar is drawn. Without it, lines are written to the stream.
+    policy : PreparationPolicy, optional
+        Policy of the messages.
+
+    Raises
+    ------
+    LimitReachedError
+        The body raised one.
     """
     from netsp.base.compiled.numba_loading import when_numba_is_loaded
 
-    preparation = Preparation(stream, line)
+    preparation = Preparation(stream, line, policy)
     is_over = False
     with ExitStack() as listening:
 
@@ -52,6 +64,13 @@ def compile_messages(stream: TextIO, line: StatusLine | None = None) -> Iterator
         when_numba_is_loaded(listen)
         try:
             yield
+        except LimitReachedError as error:
+            if type(error) is not LimitReachedError or not preparation.has_delayed:
+                raise
+            raise LimitReachedError(
+                f"{error}; compiling took {preparation.spent_s:.0f} s of it, once per "
+                "installation: run the command again, or run `netsp warm-up` first"
+            ) from error
         finally:
             is_over = True
 
@@ -130,12 +149,16 @@ class PreparationPolicy:
         Characters of the bar on a wide terminal; a longer one leaves less room for the text.
     min_bar_columns : int
         Characters of the bar on a narrow terminal; a shorter one hardly shows progress.
+    min_delay_s : float
+        Seconds of compiling from which on a time limit that is reached is put down to it; a larger
+        value leaves it to the problem.
     """
 
     expected_share: float = 0.25
     every_s: float = 30.0
     max_bar_columns: int = 20
     min_bar_columns: int = 5
+    min_delay_s: float = 1.0
 
     def __post_init__(self) -> None:
         check_positive(self)
@@ -172,9 +195,10 @@ class Preparation:
         self,
         stream: TextIO,
         line: StatusLine | None = None,
-        policy: PreparationPolicy = PreparationPolicy(),
+        policy: PreparationPolicy | None = None,
     ) -> None:
-        self._stream, self._line, self._policy = stream, line, policy
+        self._stream, self._line = stream, line
+        self._policy = policy or PreparationPolicy()
         self._depth, self._expected_s, self._done_s, self._spent_s = 0, 0.0, 0.0, 0.0
         self._begun_at = self._printed_at = 0.0
         self._subject: str | None = None
@@ -209,6 +233,17 @@ class Preparation:
             self._spent_s += time.monotonic() - self._begun_at
         self._show()
 
+    @property
+    def spent_s(self) -> float:
+        """Seconds spent on compiling so far."""
+        under_way_s = time.monotonic() - self._begun_at if self._depth else 0.0
+        return self._spent_s + under_way_s
+
+    @property
+    def has_delayed(self) -> bool:
+        """Whether compiling took so long that it explains why a time limit was reached."""
+        return self.spent_s >= self._policy.min_delay_s
+
     def close(self) -> None:
         """Remove the bar."""
         if self._line is not None:
@@ -228,7 +263,7 @@ class Preparation:
         if not self._printed_at:
             print(text, file=self._stream, flush=True)
         elif now - self._printed_at >= self._policy.every_s and self._depth:
-            so_far_s = self._spent_s + now - self._begun_at
+            so_far_s = self.spent_s
             left_s = max(self._expected_s - self._done_s, 1.0)
             print(
                 f"preparing {self._subject}, {so_far_s:.0f} s so far, about {left_s:.0f} s left",

@@ -61,9 +61,15 @@ def import_site(
     found = read_map(file, options.crs, options.units, options.policy)
     for layer in kinds:
         if layer not in found.layer_names and layer not in SHAPE_LAYERS:
+            typed = next(theirs for _, theirs in options.maps if theirs.lower() == layer)
+            if not any(found.layers):
+                raise InputError(
+                    f"--map: the map has no layers; expected one of {', '.join(SHAPE_LAYERS)}, got "
+                    f"{typed!r}"
+                )
             raise InputError(
-                f"--map: {file} has no layer {layer!r}; it has "
-                f"{', '.join(k or 'no layers' for k in found.layers)}"
+                f"--map: {file} has no layer {typed!r}; it has "
+                f"{', '.join(filter(None, found.layers))}"
             )
     properties = {str(name).lower() for feature in found.features for name in feature.properties}
     for ours, theirs in fields.items():

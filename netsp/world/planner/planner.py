@@ -375,12 +375,19 @@ class Planner:
         """
         self.excess_payout, self.trail = more, trail
 
+    @property
+    def _author(self) -> str:
+        """Name of the program to which a defect is put down: netsp, or a planner of somebody
+        else."""
+        is_ours = type(self).__module__.partition(".")[0] == "netsp"
+        return "netsp" if is_ours else f"planner {self.name!r}"
+
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
         """Return a command to stay and try again; leave the waypoint out after a while."""
         self._held += 1
         self.defects.append(f"{type(error).__name__}: {error}")
         if self._held > self.policy.max_holds:
-            self.leave_out(f"a defect of netsp ended planning ({self.defects[-1]})")
+            self.leave_out(f"a defect of {self._author} ended planning ({self.defects[-1]})")
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
