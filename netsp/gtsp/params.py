@@ -21,8 +21,8 @@ def read_params(kind: type[P], solver: str, params: Mapping[str, Any] | None) ->
     """Return a solver's options as its dataclass.
 
     The value of an option that is itself a dataclass, such as a policy, is an instance of it or a
-    mapping of its fields; ``{"policy.cuts.max_rounds": 5}`` is short for
-    ``{"policy": {"cuts": {"max_rounds": 5}}}``.
+    mapping of its fields; ``{"policy.cuts.max_combs": 5}`` is short for
+    ``{"policy": {"cuts": {"max_combs": 5}}}``.
 
     Parameters
     ----------

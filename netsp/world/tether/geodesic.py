@@ -1,11 +1,12 @@
 """`geodesic`: a tether that is the locally shortest curve of its homotopy class.
 
-The tether passes through nothing thicker than 1.8 delta, and its length is that of the curve, not
-of its chords; `netsp.world.tether.pull` and docs/theory/tether say why. Where the shortest curve of
-a class is unique, as among vertical prisms, it depends only on the robot's position and the class,
-so driving back undoes driving. Elsewhere a class may have several locally shortest curves, for
-example if the tether could slip off the end of a pipe. Then the tether stays on the curve to which
-it was driven for as long as that curve exists.
+Where the distance field is 1-Lipschitz, the tether passes through nothing thicker than 1.8 delta;
+`netsp.world.tether.pull` and docs/theory/tether say why. Interpolated fields, as of meshes, may be
+steeper: for them this is observed, not proven. The tether's length is that of the curve, not of its
+chords. Where the shortest curve of a class is unique, as among vertical prisms, it depends only on
+the robot's position and the class, so driving back undoes driving. Elsewhere a class may have
+several locally shortest curves, for example if the tether could slip off the end of a pipe. Then
+the tether stays on the curve to which it was driven for as long as that curve exists.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@ Invariant. Every node is on a surface or free, and no sample of an edge is deepe
 / 8, inside a solid; samples are so dense that no point between them is deeper than delta / 4. A
 motion either sweeps free water or is no longer than a stride, delta / 5. So no point of the strand
 is ever deeper than 0.45 delta, and putting a node back on the surface sweeps no deeper than twice
-that. A solid thicker than 1.8 delta therefore keeps the strand on its side, and the homotopy class
-never changes. The argument needs only that distances are 1-Lipschitz.
+that. Where distances are 1-Lipschitz, a solid thicker than 1.8 delta therefore keeps the strand on
+its side, and the homotopy class never changes. Interpolated fields, as of meshes, may be steeper
+(docs/theory/tether): for them this is observed, not proven.
 
 Taut. With its nodes on rulings (`strand.update_frame`) the strand's length is, to first order in
 the motions along them, a sum over edges. Its Hessian is tridiagonal. On cylinders and straight
