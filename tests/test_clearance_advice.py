@@ -42,6 +42,16 @@ def test_a_warning_comes_below_the_sum_and_its_number_ends_it(clearance, error, 
     assert clearance_advice(0.0, "pixels", policy) is None
 
 
+def test_the_terms_of_a_clearance_are_in_words_and_none_is_zero():
+    both = clearance_advice(0.3, "m", ClearancePolicy(position_error=0.3, current=0.5))
+    assert (
+        "(0.3 m of position error + 0.1 m that the vehicle strays from its path + 0.03 m " in both
+    )
+    assert "for a current of 0.5 m/s)" in both
+    neither = clearance_advice(0.05, "m", ClearancePolicy())
+    assert "(0.1 m that the vehicle strays from its path)" in neither
+
+
 def test_the_numbers_are_those_of_flights():
     assert ClearancePolicy().min_clearance == pytest.approx(0.10)
     assert ClearancePolicy(current=0.8).min_clearance == pytest.approx(0.15, abs=0.005)

@@ -83,7 +83,7 @@ def test_a_mission_from_the_middle_is_solved_judged_flown_and_reported(planned, 
     text = (tmp_path / "run.html").read_text()
     for said in ("a flight", "2 of 2 waypoints visited", "Tether over time", "Nothing unforeseen"):
         assert said in text
-    assert "words at the stops" in (tmp_path / "plan.html").read_text()
+    assert "words at the visits" in (tmp_path / "plan.html").read_text()
     first = mission.waypoints[1].position
     assert json.loads((tmp_path / "run" / "mission.json").read_text())["state"]["position"] == (
         pytest.approx(first, abs=1e-6)

@@ -169,6 +169,16 @@ def test_both_commands_write_what_they_say(tmp_path, capsys):
     assert maps.stat().st_size > 5000
 
 
+def test_where_no_place_has_a_tour_none_is_called_the_best(capsys):
+    """Both places are so far off that no tether reaches the goals."""
+    argv = ["base", str(PROBLEMS / "wharf.json"), "--line", "900,900,910,900,2", "--quiet"]
+    assert main(argv) == 3
+    said = capsys.readouterr()
+    assert "2 places, 0 of them possible, 0 solved\n" in said.out
+    assert "the first" not in said.out
+    assert "no place has a tour" in said.err
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
@@ -265,7 +275,10 @@ def test_margins_are_printed(tmp_path, capsys):
     wharf, out = str(PROBLEMS / "wharf.json"), tmp_path / "s.json"
     assert main(["solve", wharf, "-o", str(out), "--margin", "0.2", "--quiet"]) == 0
     assert main(["margins", wharf, str(out), "-o", str(tmp_path / "m.json")]) == 0
-    assert "obstacles    may be off by 0.4 m" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "obstacles    may be off by 0.4 m" in said
+    assert re.search(r"tether       may shrink by \S+ m before a goal is out of reach", said)
+    assert re.search(r"cross-track  the tour stays clear .* up to \S+ m off its path", said)
     assert json.loads((tmp_path / "m.json").read_text())["stops"][0]["slack"] > 0
     assert main(["verify", wharf, str(out), "--margins"]) == 0
     assert "grown by 0.2" in capsys.readouterr().out

@@ -191,9 +191,9 @@ FALSE = {
         "tethers as long as stated",
     ),
     "that words are exact": (
-        lambda m: changed(m, exact=not m.tour.exact), "words at the stops"
+        lambda m: changed(m, exact=not m.tour.exact), "words at the visits"
     ),
-    "the word of a stop": (lambda m: another_stop(m, 1, signature=(9,)), "words at the stops"),
+    "the word of a stop": (lambda m: another_stop(m, 1, signature=(9,)), "words at the visits"),
     "the tether of a stop": (
         lambda m: another_stop(m, 1, tether_length=m.tour.stops[1].tether_length + 0.3),
         "tethers as long as stated",

@@ -31,8 +31,9 @@ def describe(problem: Problem, found: Margins) -> str:
     units = problem.units
     lines = [
         f"obstacles    may be off by {found.obstacles:.6g} {units}: then {found.limited_by}",
-        f"tether       {found.tether:.6g} {units} may be lost before a goal is",
-        f"cross-track  {found.cross_track:.6g} {units} beside the path are borne",
+        f"tether       may shrink by {found.tether:.6g} {units} before a goal is out of reach",
+        "cross-track  the tour stays clear and within the tether if the robot is up to "
+        f"{found.cross_track:.6g} {units} off its path",
         "",
         f"{'visit':>5}  {'goal':<14} {'tether':>10} {'slack':>10} {'turning':>9} {'tension':>8} "
         f"{'clearance':>9}",

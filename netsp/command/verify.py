@@ -78,7 +78,7 @@ def _path_in_scene(args: argparse.Namespace) -> int:
     points = points_of(args.solution)
     m = until_interrupted("measuring the path", lambda: measure_path(scene, points))
     if not args.quiet:
-        kind = "loop" if m.closed else "path, its ends joined to its beginning by shortest ways"
+        kind = "loop" if m.closed else "path; for its word, a shortest path joins its ends"
         print(f"length    {m.length:.6g} {scene.units} ({kind})")
         print(f"word      {list(m.signature) if m.signature else 'empty: nothing holds it'}")
         turns = "all zero" if not any(m.windings) else list(m.windings)

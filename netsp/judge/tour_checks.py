@@ -254,7 +254,8 @@ class _Judge:
             + (f", tether less {100.0 * self.solution.slack:g} % slack" * (self.solution.slack > 0))
             if same
             else f"solution is for another problem or another version of it "
-            f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…)",
+            f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…); plan "
+            "again, or take the problem that it was planned for",
         )
 
     def _is_finite(self) -> bool:

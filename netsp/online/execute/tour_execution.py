@@ -334,7 +334,7 @@ class _Run:
         """Let an event happen that nobody could check before."""
         try:
             if event.kind == "push" and self.live is not None:
-                raise InputError("push: a real vehicle says itself where it is")
+                raise InputError("push: a real vehicle reports its own position; expected none")
             problem_after(self.problem, event, self.policy)
         except InputError as error:
             self._log_event(event.kind, "ignored", f"cannot be: {error}", 0.0)

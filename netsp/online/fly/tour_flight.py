@@ -129,7 +129,7 @@ def check_options(
 ) -> None:
     """Raise InputError if a real vehicle cannot be flown with this reach and these events."""
     if surprises is not None and any(e.kind == "push" for e in surprises.events):
-        raise InputError("surprises: push: a real vehicle says itself where it is; expected none")
+        raise InputError("surprises: push: a real vehicle reports its own position; expected none")
     if options.reach < policy.min_reach:
         raise InputError(f"reach: expected at least {policy.min_reach:g}, got {options.reach:g}")
 

@@ -165,7 +165,7 @@ def find_viewpoints(
         still_hidden = part[~seen[part]]
         if clock.is_up or not len(still_hidden):
             continue
-        on_progress(f"looking for what is hidden, {int((~seen).sum())} patches left")
+        on_progress(f"viewpoints for hidden patches, {int((~seen).sum())} left")
         for place, patch in zip(
             *viewer.places_before(*_around(viewer, still_hidden, rng)), strict=True
         ):

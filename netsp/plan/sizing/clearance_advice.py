@@ -122,8 +122,7 @@ def clearance_advice(
     needed = p.min_clearance / metres - margin
     text = (
         f"clearance: {has} is less than the {_rounded(p.min_clearance, up=True):g} m that flights "
-        f"need (position error {p.position_error:g} m + {p.path_error:g} m + "
-        f"{p.error_by_current:g} s × current {p.current:g} m/s); "
+        f"need ({_terms(p)}); "
     )
     if room is None or room.max_clearance >= needed:
         return (
@@ -138,6 +137,17 @@ def clearance_advice(
         f"{text}{room.place} is only {shown:g} {units} from {room.obstacle}, "
         f"so clearance {raised}: move {room.place}{less}"
     )
+
+
+def _terms(policy: ClearancePolicy) -> str:
+    """Return what the minimum clearance is made of, without terms that are zero."""
+    terms = [f"{policy.path_error:g} m that the vehicle strays from its path"]
+    if policy.position_error:
+        terms.insert(0, f"{policy.position_error:g} m of position error")
+    if policy.current:
+        by_current = policy.error_by_current * policy.current
+        terms.append(f"{by_current:.3g} m for a current of {policy.current:g} m/s")
+    return " + ".join(terms)
 
 
 def _rounded(value: float, *, up: bool) -> float:

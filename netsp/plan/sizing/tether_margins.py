@@ -73,7 +73,7 @@ class Margins:
     limited_by : str
         What ends that.
     tether : float
-        Length of tether that may be lost before a goal is.
+        Length by which the tether may shrink before a goal is out of reach.
     cross_track : float
         Distance by which the robot may be beside its path without leaving its class or
         outstretching the tether. What its body needs beyond its centre is in the problem's
@@ -140,7 +140,10 @@ def margins(
     """
     friction = checked_argument("friction", friction, 0.0, MAX_FRICTION)
     if solution.problem.sha256 != problem.sha256:
-        raise InputError("solution: is for another problem (sha256 differs)")
+        raise InputError(
+            "solution: is for another problem or another version of it; plan again, or take the "
+            "problem that it was planned for"
+        )
     if not solution.tour:
         raise InputError("solution: has no tour")
     if problem.state is not None:

@@ -172,7 +172,7 @@ class _Judge:
 
     def _leg_name(self, leg: int) -> str:
         """Return the name of a leg in messages."""
-        return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
+        return "the way home" if leg == len(self.tour.stops) else f"the way to visit {leg}"
 
     def _check_extent(self) -> Check:
         """Check that paths stay within the scene's bounds and the tether's reach."""
@@ -197,7 +197,7 @@ class _Judge:
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
         largest_gap = max(gaps, default=0.0)
         n_left_out = len(self.mission.waypoints) - len(self.tour.stops)
-        detail = counted(len(self.tour.stops), "stop")
+        detail = counted(len(self.tour.stops), "visit")
         detail += f", {counted(n_left_out, 'waypoint')} left out" if n_left_out else ""
         passed = largest_gap <= self.mission.reach
         original_numbers = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
@@ -206,7 +206,7 @@ class _Judge:
             return Check(
                 "leads through the waypoints and home",
                 False,
-                f"two stops say that they are waypoint #{twice} of the file",
+                f"two visits say that they are waypoint #{twice} of the file",
             )
         return Check(
             "leads through the waypoints and home",
@@ -276,7 +276,7 @@ class _Judge:
             word, broken = words.try_word(np.vstack([walked, mission.places[k]]))
             if broken is not None or word != stop.signature:
                 found = "no word" if broken is not None else f"the word {list(word)}"
-                wrong.append(f"stop {k} has {found}, stated {list(stop.signature)}")
+                wrong.append(f"visit {k} has {found}, stated {list(stop.signature)}")
         word, broken = words.try_word(
             np.vstack([walked, self.legs[-1], self.context.start_tether.nodes[::-1]])
         )
@@ -284,7 +284,7 @@ class _Judge:
             wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
         caveat = "" if words.exact else "; other words may be of the same class, too"
         return [
-            Check("words at the stops", not wrong, _first_of(wrong) or f"all as stated{caveat}"),
+            Check("words at the visits", not wrong, _first_of(wrong) or f"all as stated{caveat}"),
             Check(
                 "empty word at the end",
                 broken is None and word == (),
@@ -310,7 +310,7 @@ class _Judge:
         as_laid = model.update(start_tether, tether.robot)
         excess = model.refine(tether).length - model.refine(as_laid).length
         limit = self.mission.tether_length
-        name = "home" if longest_leg == len(self.tour.stops) else f"stop {longest_leg}"
+        name = "home" if longest_leg == len(self.tour.stops) else f"visit {longest_leg}"
         return [
             Check(
                 "within the tether's length",
@@ -333,7 +333,7 @@ class _Judge:
             (longest_on_leg, stop.longest_tether, "on the way to"),
         ):
             if abs(length - stated) > self.mission.delta + self.policy.max_length_error * stated:
-                deviations.append(f"{relation} stop {k}: {length:.3f} m, stated {stated:.3f}")
+                deviations.append(f"{relation} visit {k}: {length:.3f} m, stated {stated:.3f}")
         return deviations
 
     def _check_length(self) -> Check:

@@ -164,7 +164,7 @@ class RobotPaths:
         times = self.context.policy.times
         search_clock, tether_clock = clock.part(times.path_search_share), None
         for n in range(len(self.points)):
-            on_progress(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
+            on_progress(f"paths of the robot from waypoint {n + 1} of {len(self.points)}")
             if search_clock.is_up and tether_clock is None:
                 tether_clock = clock.part(times.tether_path_share)
             self.find_from(n, search=tether_clock is None, tether_clock=tether_clock)

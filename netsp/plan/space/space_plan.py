@@ -552,9 +552,9 @@ def _find_states(run: _Run) -> States:
     nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
     if nearest <= limit:
         raise InputError(
-            f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
-            f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
-            f"or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
+            f"waypoints: no path through the water brings any of them within {limit:.4g} m of "
+            f"tether, though the nearest is {nearest:.4g} m from the anchor as the crow flies: "
+            f"walls, or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
         )
     raise InputError(
         f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
@@ -594,7 +594,7 @@ class _StateSearch:
         add_states_of_trees(self.states, self.paths, clock.part(times.tree_share))
         board.update(self.growth.legs, clock.part(times.home_path_share))
         if missing := set(range(len(run.mission.waypoints))) - board.reached_waypoints:
-            on_progress("ways with room for the robot")
+            on_progress("paths with room for the robot")
             part = clock.part(times.first_states_share)
             add_states_with_room(self.states, missing, self.effort.words, part)
             board.update(self.growth.legs, clock.part(times.home_path_share))
@@ -615,7 +615,7 @@ class _StateSearch:
                 clock.part(times.growth_share) if share_suffices else Clock(times.min_growth_s)
             )
             has_grown = self.growth.grow(max_per_place, growing, on_progress)
-            on_progress("ways by the anchor")
+            on_progress("paths by way of the anchor")
             has_homes = board.update(self.growth.legs, clock.part(times.home_path_share))
             is_complete = (has_homes and has_grown) or is_complete
             is_last = max_per_place == self.effort.states[-1]

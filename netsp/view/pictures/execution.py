@@ -16,8 +16,8 @@ from netsp.view.pictures import style
 from netsp.view.pictures.problem_picture import draw_obstacles
 
 RESPONSES = {
-    "local": "mended on the spot",
-    "replan": "planned anew",
+    "local": "leg repaired",
+    "replan": "planned again",
     "home": "went home",
     "kept": "plan kept",
     "defect": "defect, went home",

@@ -83,11 +83,11 @@ def checks(verdict: Verification) -> str:
     return f"<table>{rows}</table>"
 
 
-def planned_with(solution: Solution) -> str:
+def planned_with(solution: Solution, units: str) -> str:
     """Return the margins that a tour was planned with as a sentence, or an empty string."""
     parts = []
     if solution.margin:
-        parts.append(f"obstacles that are off by {solution.margin:g}")
+        parts.append(f"obstacles that may be off by {solution.margin:g} {units}")
     if solution.slack:
         parts.append(f"{100.0 * solution.slack:g} % of slack")
     if solution.max_tension_ratio is not None:
@@ -215,8 +215,8 @@ def margin_list(problem: Problem, found: Margins) -> str:
         if math.isinf(found.obstacles)
         else f"every obstacle may be off by {found.obstacles:.4g} {u}, moved or grown; then "
         f"{found.limited_by}",
-        f"{found.tether:.4g} {u} of the tether may be lost before a goal is out of reach",
-        f"the robot may be {found.cross_track:.4g} {u} beside its path",
+        f"the tether may shrink by {found.tether:.4g} {u} before a goal is out of reach",
+        f"the robot may be {found.cross_track:.4g} {u} off its path",
     ]
     if found.friction:
         worst = max(found.visits, key=lambda s: s.tension_ratio)

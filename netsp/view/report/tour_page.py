@@ -103,7 +103,7 @@ def _summary(problem: Problem, solution: Solution, what: Opened) -> str:
         f"{units} long ({html.escape(_proof(solution))}; solver {html.escape(solution.solver)}). "
         f"{html.escape(briefing.first_words(problem, solution))}"
     ]
-    if planned := briefing.planned_with(solution):
+    if planned := briefing.planned_with(solution, problem.units):
         lines.append(html.escape(planned))
     if what.run is not None:
         s = json_of(what.run / "summary.json")

@@ -64,10 +64,10 @@ class PlannedTour(Model):
 
     stops: Annotated[
         tuple[PlannedVisit, ...],
-        Field(description="stops, one for each of the first waypoints; the others are not reached"),
+        Field(description="visits, one for each of the first waypoints; others are not reached"),
     ]
     home: Annotated[
-        PathField, Field(description="path from the last stop to the start, (x, y, z), m")
+        PathField, Field(description="path from the last visit to the start, (x, y, z), m")
     ]
     status: Annotated[
         Status,
@@ -179,14 +179,14 @@ class PlannedTour(Model):
                 if distance > tolerance:
                     return (
                         f"stops[{k}].path: {name} {distance:.2f} m from "
-                        f"{'waypoint' if end else 'the stop before'}"
+                        f"{'waypoint' if end else 'the visit before'}"
                         f"{f' #{k}' if end else ''}; expected no more than {tolerance:g}"
                     )
             place_before = places[k]
         for name, place, end in (("begins", place_before, 0), ("ends", np.array(start), -1)):
             distance = float(np.linalg.norm(np.array(self.home[end]) - place))
             if distance > tolerance:
-                where = "the start" if end else "the last stop"
+                where = "the start" if end else "the last visit"
                 return (
                     f"home: {name} {distance:.2f} m from {where}; expected no more than "
                     f"{tolerance:g}"

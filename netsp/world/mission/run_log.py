@@ -285,14 +285,14 @@ def _class_lines(words: dict[str, Any] | None) -> list[str]:
     else:
         at_home = f"NOT empty at home: {home}" if home else "empty at home"
     return [
-        f"classes  as planned at {words['as_planned']} of {len(words['stops'])} stops; {at_home}"
+        f"classes  as planned at {words['as_planned']} of {len(words['stops'])} visits; {at_home}"
     ]
 
 
 _RESPONSES = {
     "kept": "kept",
-    "local": "mended",
-    "replan": "the rest planned anew",
+    "local": "repaired",
+    "replan": "the rest planned again",
     "legs": "left to be found leg by leg",
 }
 """Responses of a repair in words."""
