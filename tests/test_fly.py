@@ -17,7 +17,7 @@ import pytest
 from netsp import Circle, Problem, solve
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
-from netsp.command.fly import way_home
+from netsp.command.fly import path_home
 from netsp.command.main import main
 from netsp.online.execute.events import Surprises
 from netsp.online.execute.execution_log import ExecutionOptions
@@ -423,7 +423,7 @@ def test_the_way_home_has_no_bends_within_a_share_of_the_clearance():
     done = SimpleNamespace(tethers=[(0.0, tether)], problem=SITE, options=ExecutionOptions())
     waypoints = [
         tuple(map(float, w.split(",")))
-        for w in re.findall(r"\(([^)]*)\)", way_home(done).split(" by ")[1])
+        for w in re.findall(r"\(([^)]*)\)", path_home(done).split(" by ")[1])
     ]
     assert len(waypoints) < 8
     assert waypoints[-1] == (0.0, 5.9, 0.0)
@@ -432,7 +432,7 @@ def test_the_way_home_has_no_bends_within_a_share_of_the_clearance():
     rounding = 0.01
     for place in tether:
         assert polylines.distance(line, place) <= share * SITE.clearance + rounding
-    every = way_home(done, replace(FlightPolicy(), max_home_offset=1e-6))
+    every = path_home(done, replace(FlightPolicy(), max_home_offset=1e-6))
     assert every.count("(") == len(tether) - 1
 
 

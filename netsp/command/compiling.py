@@ -236,12 +236,11 @@ class Preparation:
     @property
     def spent_s(self) -> float:
         """Seconds spent on compiling so far."""
-        under_way_s = time.monotonic() - self._begun_at if self._depth else 0.0
-        return self._spent_s + under_way_s
+        return self._spent_s + (time.monotonic() - self._begun_at if self._depth else 0.0)
 
     @property
     def has_delayed(self) -> bool:
-        """Whether compiling took so long that it explains why a time limit was reached."""
+        """True if compiling took so long that it explains why a time limit was reached."""
         return self.spent_s >= self._policy.min_delay_s
 
     def close(self) -> None:

@@ -148,7 +148,7 @@ def _report_failure(args: argparse.Namespace, done: Execution) -> tuple[Exceptio
             try:
                 write_result(args, done)
                 if not args.quiet and (done.stopped or done.interrupted):
-                    print(way_home(done), file=sys.stderr)
+                    print(path_home(done), file=sys.stderr)
             except Exception as error:
                 failure = error
     except KeyboardInterrupt:
@@ -337,7 +337,7 @@ def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
             print(f"{number:>6}  {cells}  {name if is_last else 'bend'}")
 
 
-def way_home(done: Execution, policy: FlightPolicy | None = None) -> str:
+def path_home(done: Execution, policy: FlightPolicy | None = None) -> str:
     """Return the path home, in the tether's class, from the last position of the vehicle.
 
     Waypoints without which the path stays within a share of the clearance from the tether are left

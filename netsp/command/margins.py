@@ -32,7 +32,7 @@ def describe(problem: Problem, found: Margins) -> str:
     lines = [
         f"obstacles    may be off by {found.obstacles:.6g} {units}: then {found.limited_by}",
         f"tether       may shrink by {found.tether:.6g} {units} before a goal is out of reach",
-        "cross-track  the tour stays clear and within the tether if the robot is up to "
+        "cross-track  the tour holds if the robot is up to "
         f"{found.cross_track:.6g} {units} off its path",
         "",
         f"{'visit':>5}  {'goal':<14} {'tether':>10} {'slack':>10} {'turning':>9} {'tension':>8} "
