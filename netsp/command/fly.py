@@ -11,8 +11,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from netsp.base.errors import InputError
 from netsp.command.clearance_warning import warn_of_problem
 from netsp.command.types import load_verified_pair
@@ -343,6 +341,8 @@ def path_home(done: Execution, policy: FlightPolicy | None = None) -> str:
     Waypoints without which the path stays within a share of the clearance from the tether are left
     out.
     """
+    import numpy as np
+
     from netsp.base.geometry import polylines
     from netsp.online.fly.flight_policy import FlightPolicy
 
