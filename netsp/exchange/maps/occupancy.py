@@ -111,7 +111,7 @@ def read_occupancy(
     points = [base, *(_place(g) for g in goals)]
     polygons, cell_notes = _polygons(occupied, map_file, slack, points, policy)
     for text in cell_notes:
-        note(f"obstacles of {map_file.image}: {text}")
+        note(f"{map_file.image}: {text}")
     try:
         return Problem.model_validate(
             {
