@@ -656,7 +656,7 @@ def test_a_solution_and_runs_can_be_looked_at_and_not_changed(tmp_path):
                 rows = socket.receive_json()["facts"]["profile"]
                 assert max(r[1] for r in rows) <= state["data"]["tether_length"]
                 socket.send_json({"id": 1, "edit": {"delete": [["goals", 0]]}})
-                assert "only shows" in socket.receive_json()["error"]
+                assert "read-only" in socket.receive_json()["error"]
                 for share, row in ((0.0, rows[0]), (1.0, rows[-1])):
                     socket.send_json({"id": 2, "along": share})
                     told = socket.receive_json()["along"]

@@ -117,7 +117,7 @@ def test_formats_that_are_damaged_and_columns_that_are_missing_are_told(tmp_path
     file = tmp_path / "log.bin"
     rows = place(1.0, 1.0, 2.0, 3.0)
     file.write_bytes(header().replace(b"QBccCfffffffccce", b"QBccCfff!fffccce", 1) + rows)
-    with pytest.raises(InputError, match="no log of ArduPilot"):
+    with pytest.raises(InputError, match="not a log of ArduPilot"):
         list(read_fixes(file, Frame(SITE)))
     file.write_bytes(header().replace(b"dPD,PN,PE", b"dPD,QN,PE", 1) + rows)
     with pytest.raises(InputError, match=r"without its column.*PN"):

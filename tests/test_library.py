@@ -112,7 +112,7 @@ def test_check_tells_keeps_and_exits_with_5_when_the_judge_refuses(small, tour, 
     tour.model_copy(update={"length": 0.9 * tour.length}).save(bad)
     words = ["library", "check", str(good), "--folder", str(small)]
     assert main([*words, "--keep", "--by", "me"]) == 0
-    assert "nothing was known" in capsys.readouterr().out
+    assert "no tour of this problem was known" in capsys.readouterr().out
     assert main(words) == 0
     assert "above the best known" in capsys.readouterr().out
     assert main(["library", "check", str(bad), "--folder", str(small), "--json"]) == 5

@@ -144,7 +144,7 @@ def test_a_function_may_claim_a_bound_but_not_more_than_its_tour():
     ("tour", "why"),
     [([0, 1, 2, 0], "vertex 0 is repeated at its end"), ([0, 1], "no vertex of cluster 2"),
      ([1, 2, 0], "does not begin at vertex 0"), ([0, 1, 1, 2], "cluster 1 is visited twice"),
-     ([0, 1, 7], "7 is no vertex"), ([0, 1.5, 2], "no sequence of whole numbers")],
+     ([0, 1, 7], "7 is not a vertex"), ([0, 1.5, 2], "not a sequence of whole numbers")],
 )  # fmt: skip
 def test_what_is_wrong_with_a_tour_is_said(tour, why):
     graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])

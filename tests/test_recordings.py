@@ -302,8 +302,8 @@ def tried(monkeypatch, m):
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (np.random.default_rng(5).bytes(40_000), "no telemetry log"),
-        (b"Notes of a dive, in words. " * 1500, "no telemetry log"),
+        (np.random.default_rng(5).bytes(40_000), "not a telemetry log"),
+        (b"Notes of a dive, in words. " * 1500, "not a telemetry log"),
         (b"\xa3\x95" + np.random.default_rng(6).bytes(40_000), "end in .bin"),
         (b"\x1f\x8b" + np.random.default_rng(7).bytes(40_000), "gunzip"),
     ],

@@ -135,7 +135,7 @@ class Session:
         """
         document = self.document
         if self.shown is not None and any(k in message for k in ("edit", "undo", "redo", "save")):
-            raise InputError("this page only shows: nothing can be edited on it")
+            raise InputError("this page is read-only")
         if "edit" in message:
             document.apply(message["edit"])
             self._changed()

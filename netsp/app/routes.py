@@ -150,7 +150,7 @@ class Routes:
         """Replace the document by an imported file; return the notes and warnings of the import."""
         session = self.session
         if session.shown is not None:
-            raise InputError("this page only shows: nothing can be edited on it")
+            raise InputError("this page is read-only")
         tether = session.document.data.get("tether_length")
         data, notes = await asyncio.to_thread(
             imported,

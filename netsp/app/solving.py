@@ -94,7 +94,7 @@ class Worker:
                     {
                         "version": version,
                         "stage": "failed",
-                        "error": "the solver's process died; it is started again",
+                        "error": "the solver's process ended unexpectedly; it is started again",
                     }
                 )
                 self._latest = None

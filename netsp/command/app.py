@@ -68,17 +68,17 @@ def run(args: argparse.Namespace) -> int:
         shown = read_shown(args.problem, args.problem_file)
         document = Document(None, shown.data)
     elif args.problem_file is not None:
-        raise InputError("--problem: goes with --show only")
+        raise InputError("--problem: needs --show")
     else:
         document, notes = _document(args.problem)
     if not document.saved:
-        messages.note(f"{args.problem}: what was edited last and not saved is on the map")
+        messages.note(f"{args.problem}: the map shows your last edits, which were not saved")
     if not 0 <= args.port <= 65535:
         raise InputError(f"--port: expected 0 to 65535, got {args.port}")
     try:
         listening = socket.create_server(("127.0.0.1", args.port))
     except OSError as error:
-        raise InputError(f"--port: {args.port} cannot be had: {error.strerror}") from None
+        raise InputError(f"--port: {args.port} cannot be used: {error.strerror}") from None
     with listening:
         port = listening.getsockname()[1]
         token = secrets.token_urlsafe(24)

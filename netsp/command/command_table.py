@@ -162,7 +162,7 @@ APP = Command(
     ),
     Option("--port N", "port to listen on; default: a free one", int, 0),
     Option("--time-limit S", "seconds of solving after each edit", positive, 60),
-    Option("--no-browser", "print the address, and open no browser"),
+    Option("--no-browser", "print the address without opening a browser"),
 )
 
 COVER = Command(
@@ -214,7 +214,7 @@ COVER = Command(
 )
 
 VERIFY = Command(
-    "judge a solution independently of what found it",
+    "check a solution, independently of the solvers",
     "netsp verify problems/wharf.json solution.json",
     Input(
         "PROBLEM", "problem file, or a mission that was planned; for a path, also a scene (JSON)"
@@ -225,7 +225,7 @@ VERIFY = Command(
         "print measures of entanglement; SOLUTION may then be any path (a file that netsp "
         "compare-path reads, or a JSON list of points)",
     ),
-    Option("--margins", "also print how far the world may be off, as netsp margins does"),
+    Option("--margins", "also print the margins, as netsp margins does"),
     frame("frame of a path to measure: local (the problem's plane) or global (degrees)"),
     Option(
         "--system N",
@@ -237,7 +237,7 @@ VERIFY = Command(
 )
 
 MARGINS = Command(
-    "find how far the world may be off before a tour does not fit",
+    "find which errors of map and position a tour tolerates",
     "netsp margins problems/wharf.json solution.json --friction 0.2",
     PROBLEM,
     Input("SOLUTION", "solution file (JSON)"),
@@ -268,7 +268,7 @@ PLOT = Command(
 )
 
 ANIMATE = Command(
-    "show a tour or a run as a moving picture",
+    "animate a tour or a run",
     "netsp animate tour.json --problem problems/wharf.json -o tour.gif",
     Input(
         "SOURCE...",
@@ -279,13 +279,13 @@ ANIMATE = Command(
     Output(
         "-o, --output FILE", "gif, mp4 (extra video), or a page (html) with a slider", required=True
     ),
-    Option("--seconds N", "duration of the picture", positive, 12),
+    Option("--seconds N", "duration of the animation", positive, 12),
     Option("--fps N", "frames per second", positive, 15),
     SILENT,
 )
 
 BASE = Command(
-    "find where to stand, among candidates for the base",
+    "rank candidate places for the base",
     "netsp base problems/wharf.json --grid 10,10 --plot base.png",
     Input("PROBLEM", "problem file (JSON); the base in it is ignored"),
     OneOf(
@@ -313,7 +313,7 @@ BASE = Command(
 )
 
 TETHER = Command(
-    "find how long a tether is needed, and what more of it saves",
+    "find how long a tether you need, and what a longer one saves",
     "netsp tether problems/wharf.json --longest 30 --plot tether.png",
     PROBLEM,
     Option(
@@ -348,7 +348,7 @@ GTSP = Command(
 )
 
 WORLD = Command(
-    "draw a random problem; same seed, same problem on every machine",
+    "make a random problem; a seed gives the same one on every machine",
     "netsp world --goals 30 --tether 350 --seed 7 -o world.json",
     Option(
         "--family NAME",
@@ -427,7 +427,7 @@ SIMULATE = Command(
 )
 
 EXECUTE = Command(
-    "carry a tour out online, and repair it on the way",
+    "carry out a tour in simulation, and repair it after surprises",
     "netsp execute problems/wharf.json solution.json --surprise examples/surprises.json -o run",
     Input("PROBLEM", "problem file (JSON), or a mission that was planned"),
     Input("[SOLUTION]", "solution file (JSON) of a problem"),
@@ -464,13 +464,11 @@ EXECUTE = Command(
 )
 
 ORDER = Command(
-    "another name of solve, for missions",
-    "netsp order missions/basin.json -o better.json",
-    *FOR_ALL,
+    "older name of solve, for missions", "netsp order missions/basin.json -o better.json", *FOR_ALL
 )
 
 FLY = Command(
-    "carry a tour out with a vehicle, over MAVLink",
+    "carry out a tour with a vehicle, over MAVLink",
     "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run",
     Input("[PROBLEM]", "problem file (JSON)"),
     Input("[TOUR]", "its solution file (JSON)", dest="solution"),
@@ -545,7 +543,7 @@ GUARD = Command(
         "the tether is as planned",
     ),
     Group(
-        "where it listens; the vehicle is never commanded to move",
+        "input; the guard never commands the vehicle to move",
         (
             LINK,
             Input("--replay LOG", "a recording: .csv, .csv.gz, .tlog or .bin"),
@@ -559,7 +557,7 @@ GUARD = Command(
         ),
     ),
     Group(
-        "what is known of the vehicle",
+        "about the vehicle",
         (
             Option("--noise M", "standard deviation of single positions, m", length, 0.3),
             Option(
@@ -583,7 +581,7 @@ GUARD = Command(
         "-o, --output FILE",
         "write every report as a line of JSON to this file; - is standard output",
     ),
-    Option("--quiet", "no status line and no alarms in words"),
+    Option("--quiet", "print neither status line nor alarms"),
 )
 
 EXPORT = Command(
@@ -701,7 +699,7 @@ IMPORT = Command(
         "--crop, --no-crop",
         "leave out obstacles beyond the reach of the tether; default: in charts only",
     ),
-    Option("--inspect N", "N goals about every obstacle, at every depth", positive),
+    Option("--inspect N", "N goals around every obstacle, at every depth", positive),
     Option(
         "--standoff S", "distance (m) of the goals of --inspect from the obstacle's surface", length
     ),
@@ -737,7 +735,7 @@ IMPORT = Command(
 )
 
 COMPARE = Command(
-    "solvers side by side over random worlds, resumable",
+    "compare solvers over random worlds; resumes if interrupted",
     "netsp compare examples/study.toml -o rows.jsonl --jobs 2",
     Option("[STUDY]", "study file (TOML); without one, the options below describe the study"),
     Option("-o, --output FILE", "results (JSON lines)", required=True),
@@ -762,7 +760,7 @@ COMPARE = Command(
 )
 
 COMPARE_PATH = Command(
-    "paths made by hand or recorded, beside the planned tour",
+    "compare drawn or recorded paths with the planned tour",
     "netsp compare-path problems/wharf.json examples/paths/wharf-systematic-1.csv --html page.html",
     Input(
         "PROBLEM", "problem file (JSON), or a study of paths (.toml), which names problem and paths"
@@ -809,7 +807,7 @@ COMPARE_PATH = Command(
 )
 
 LIBRARY = Command(
-    "list, check and rank on the library of problems",
+    "list the library of problems, check tours, rank solvers",
     "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl",
     Option(
         "{list,check,rank}",
@@ -859,7 +857,7 @@ COMBINE = Command(
 )
 
 REPORT = Command(
-    "one page about a comparison, a solution or a run",
+    "write a page about a comparison, a solution or a run",
     "netsp report rows.jsonl -o report.html",
     Input(
         "RESULTS", "rows of `netsp compare`, a solution, a planned mission, or the folder of a run"
@@ -886,7 +884,7 @@ CITE = Command(
 )
 
 WARM_UP = Command(
-    "compile everything ahead of the first use",
+    "compile everything before the first use",
     "netsp warm-up",
     SILENT,
     Option(
@@ -900,7 +898,7 @@ WARM_UP = Command(
 )
 
 COMPLETION = Command(
-    "print what a shell needs to complete netsp's commands",
+    "print a completion script for your shell",
     "netsp completion bash > ~/.local/share/bash-completion/completions/netsp",
     Option("{bash,zsh,tcsh}", "shell to generate completion for", dest="shell"),
 )

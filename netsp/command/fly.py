@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     problem, solution, begins = _inputs(args)
     surprises = checked_surprises(args, problem)
     if problem.units != "m":
-        raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
+        raise InputError(f"units: vehicles use metres; expected m, got {problem.units!r}")
     frame = Frame(problem, args.frame)
     if not args.quiet:
         warn_of_problem(args, problem, solution.margin)

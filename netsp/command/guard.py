@@ -23,7 +23,7 @@ def run(args: argparse.Namespace) -> int:
     if (args.link is None) == (args.replay is None):
         raise InputError("--link, --replay: expected one of them")
     if args.replay is not None and (args.publish or args.state or args.ask_rates):
-        raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
+        raise InputError("--publish, --state, --ask-rates: need a link; --replay has none")
     from netsp.base.files import is_mission_file
     from netsp.model.problem import Problem
     from netsp.online.guard.tether_guard import Guard, GuardOptions

@@ -91,7 +91,7 @@ def _check(args: argparse.Namespace, library: Library) -> int:
             why = next((c.name for c in result.verification.checks if not c.passed), "no tour")
             text = f"not verified: {why}"
         elif record is None or result.above is None:
-            text = f"{result.length:.9g}, verified; nothing was known of this problem"
+            text = f"{result.length:.9g}, verified; no tour of this problem was known"
         elif result.better:
             text = f"{result.length:.9g}, verified, {-100 * result.above:.4f} % shorter than known"
         else:
@@ -166,7 +166,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
                 )
     entries = rank.ranking(library, rows)
     if len({e["problems"] for e in entries}) > 1 and not args.quiet:
-        messages.note("not all ran over the same problems: their means are not of the same")
+        messages.note("not all ran on the same problems: do not compare their means")
     if args.json:
         json_output.tell({"ranking": entries})
         return 0

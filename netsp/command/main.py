@@ -95,7 +95,7 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
         return error.exit_code
     except MemoryError:
         messages.error(
-            "out of memory; lower tether_length, --max-classes or ask for something smaller"
+            "out of memory; lower tether_length or --max-classes, or give a smaller problem"
         )
         return EXIT_NOT_ALL
     except (KeyboardInterrupt, SystemError) as error:
@@ -193,7 +193,7 @@ def parser_of_all() -> argparse.ArgumentParser:
 def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     """Return the parser of all commands, with the arguments of the wanted ones."""
     width = max(len(name) for group in COMMANDS.values() for name in group)
-    lines = ["commands, by what they are for:"]
+    lines = ["commands by purpose:"]
     for purpose, group in COMMANDS.items():
         lines.append(f"\n  {purpose}")
         lines += [f"    {name:<{width}}  {command.text}" for name, command in group.items()]

@@ -15,6 +15,6 @@ def run(args: argparse.Namespace) -> int:
     if not is_mission_file(args.problem):
         read_text(args.problem)
         raise InputError(
-            f"{args.problem}: is no mission; expected one, or netsp solve for problems"
+            f"{args.problem}: is not a mission; expected one, or netsp solve for problems"
         )
     return solve_mission.run(args)

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
         f"{problem.goal_label(curve.needs)}"
     )
     if not curve.whole:
-        messages.warning("the time was up before the shortest sufficient tether was come to")
+        messages.warning("time ran out before the shortest sufficient tether was found")
     if args.output:
         curve.save(args.output)
     if args.plot:

@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
         return _path_in_scene(args)
     if args.solution is None:
         read_text(args.problem)  # a missing file is reported as usual
-        raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
+        raise InputError(f"SOLUTION: {args.problem} is not a mission; expected a solution, too")
     if args.measures:
         from netsp.model.problem import Problem
 

@@ -461,7 +461,7 @@ class Instance:
         if not t or t[0] != 0:
             return "it does not begin at vertex 0"
         if wrong := [v for v in t if not 0 <= v < len(self)]:
-            return f"{wrong[0]} is no vertex (0 to {len(self) - 1})"
+            return f"{wrong[0]} is not a vertex (0 to {len(self) - 1})"
         if len(t) > 1 and t[-1] == 0:
             return "vertex 0 is repeated at its end"
         clusters = self.cluster[t].tolist()

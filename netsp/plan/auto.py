@@ -244,7 +244,7 @@ def _over_shortest(graph: Instance, chosen: Params, limits: Limits) -> Result:
     place = {int(v): k for k, v in enumerate(core)}
     warm = None if given is None else [place[int(v)] for v in given]
     min_length = graph.min_length_through(np.flatnonzero(others))
-    because = "a tour by way of another class goes along its tether and back"
+    because = "a tour through another class goes along its tether and back"
 
     def bound_of_whole(bound: LowerBound | None) -> LowerBound | None:
         return None if bound is None else bound.or_elsewhere(min_length, graph.scope, because)

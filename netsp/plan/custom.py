@@ -82,7 +82,7 @@ def _parameters_of(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
         raise InputError(f"solver: {shown(solver)} takes no argument; expected the travel graph")
     for k, p in [*accepted.items()][1:]:
         if p.kind is Parameter.POSITIONAL_ONLY:
-            raise InputError(f"solver: {shown(solver)} takes {k!r} by place only; expected by name")
+            raise InputError(f"solver: {shown(solver)} takes {k!r} by position; expected by name")
     return accepted
 
 
@@ -113,7 +113,7 @@ def call(
     if tour is not None:
         vertices = whole_numbers(tour)
         if not vertices or not run.update_incumbent(vertices):
-            why = graph.why_no_tour(vertices) if vertices else "no sequence of whole numbers"
+            why = graph.why_no_tour(vertices) if vertices else "not a sequence of whole numbers"
             raise InputError(
                 f"solver {name!r}: returned {shown(tour)}: {why}; expected vertices from 0 on, one "
                 "of every cluster, or a Result"

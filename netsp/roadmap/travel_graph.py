@@ -364,7 +364,7 @@ class TravelGraph(Instance, Drawn):
         if bound is not None and whole is not scope:
             bound = bound.or_elsewhere(
                 self.min_length_left_out, whole,
-                "a tour by way of a class left out goes along its tether and back",
+                "a tour through a class left out goes along its tether and back",
             )  # fmt: skip
         return bound, whole
 

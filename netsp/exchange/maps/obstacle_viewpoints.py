@@ -144,7 +144,7 @@ def _free_viewpoints(
             number[cause] += len(names)
         causes = ", ".join(f"{n} {cause}" for cause, n in number.items())
         context.complain(
-            f"no viewpoint about an obstacle is left ({causes}); expected another standoff, "
+            f"no viewpoint around an obstacle is left ({causes}); expected another standoff, "
             "base or tether"
         )
     return kept

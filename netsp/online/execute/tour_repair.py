@@ -256,8 +256,8 @@ def _better_order(
         )
     if is_time_up:
         return None, (
-            "as far as planning came within its time limit; no new order was tried, and a longer "
-            "limit (--planning-limit) may find a shorter way"
+            "planning reached its time limit before it tried a new order; a longer limit "
+            "(--planning-limit) may find a shorter path"
         )
     return None, f"a new order could save at most {max(saving, 0.0):.1f} s"
 

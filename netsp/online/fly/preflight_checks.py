@@ -98,7 +98,7 @@ class _Checks:
         session, kind = self.session, self.session.kind
         if kind is None or not kind.is_ardusub:
             raise RefusedError(
-                f"system {session.system} is no submarine with ArduPilot: it says that it is a "
+                f"system {session.system} is not a submarine with ArduPilot: it says that it is a "
                 f"{kind}; choose another with --system, or command it anyway with --any-vehicle"
             )
 

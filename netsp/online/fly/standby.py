@@ -144,7 +144,7 @@ class _Standby:
             if self.is_settled or waited >= policy.max_answer_s:
                 if self.needs_nobody:
                     return self._end(
-                        "the vehicle stays so without a ground station (FS_GCS_ENABLE)"
+                        "the vehicle stays as it is without a ground station (FS_GCS_ENABLE)"
                     )
                 if not has_outlook:
                     has_outlook = True
@@ -170,8 +170,8 @@ class _Standby:
         if station is not None and station not in self.other_stations:
             self.other_stations.add(station)
             self.on_note(
-                f"ground station {station} is heard, but the vehicle counts on system "
-                f"{GROUND_STATION}: netsp goes on"
+                f"ground station {station} is heard, but the vehicle needs system "
+                f"{GROUND_STATION}: netsp keeps the link alive"
             )
         if session.silent_s > policy.max_standby_silence_s:
             return f"the vehicle was not heard for {session.silent_s:.0f} s"

@@ -69,7 +69,7 @@ def read_bin(
     except AttributeError as error:
         raise InputError(f"{where}: a message without its column {shown(str(error))}") from None
     except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"{where}: no log of ArduPilot: {error}") from None
+        raise InputError(f"{where}: not a log of ArduPilot: {error}") from None
     if frame.is_global and source != "POS":
         on_note(
             f"{where}: no POS with a GPS fix; {source}1 is taken as metres north, east and down of "
@@ -88,7 +88,7 @@ def _check_begin(file: Path, where: str, policy: RecordingPolicy) -> None:
         begin = stream.read(policy.searched_bytes)
     if MESSAGE_MARK not in begin:
         what = "the file is empty" if not begin else "no message in its beginning"
-        raise InputError(f"{where}: no log of ArduPilot: {what}; expected a .bin of the vehicle")
+        raise InputError(f"{where}: not a log of ArduPilot: {what}; expected a .bin of the vehicle")
 
 
 @contextlib.contextmanager
@@ -127,7 +127,7 @@ def _messages(file: Path, where: str) -> tuple[list[Any], Counter[str]]:
             numbers = {k: name for k, name in log.id_to_name.items() if log.counts[k]}
             counts = Counter({name: int(log.counts[k]) for k, name in numbers.items()})
     except Exception as error:  # which it raises itself if a format is damaged
-        raise InputError(f"{where}: no log of ArduPilot: {error}") from None
+        raise InputError(f"{where}: not a log of ArduPilot: {error}") from None
     finally:
         for part in ("data_map", "filehandle"):
             with contextlib.suppress(AttributeError, BufferError):
@@ -175,7 +175,7 @@ class _LogReader:
         if kind == self.status and (int(getattr(m, "PI", 0)) in self.cores or not self.cores):
             self.primary = int(getattr(m, "PI", 0))
         if kind in (self.places, self.status) and getattr(m, "C", self.primary) != self.primary:
-            return "of a filter that the vehicle does not go by"
+            return "of a filter that the vehicle does not use"
         if kind == self.places:
             return self._filter_fix(m, time)
         if kind == "POS":

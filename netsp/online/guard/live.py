@@ -107,7 +107,7 @@ def _prepare(guard: Guard, state: str | None, note: Callable[[str], None]) -> No
     if state is not None:
         known = restore(guard, state)
         if known is not None:
-            note(f"going on from {state}, {known.age:.0f} s old")
+            note(f"continuing from {state}, {known.age:.0f} s old")
 
 
 class _Watch:

@@ -124,8 +124,8 @@ def little_slack(site: Site, now: ClassReport, policy: AlarmPolicy = AlarmPolicy
     text = (
         f"the taut tether is {now.taut:.1f} of {site.tether_length:g} {site.units}"
         if now.slack >= 0.0
-        else f"the taut tether is {-now.slack:.1f} {site.units} longer than there is: the class "
-        "is another, or the tether is under load; go back along it"
+        else f"the taut tether is {-now.slack:.1f} {site.units} longer than the tether: it is in "
+        "another class, or under load; go back along it"
     )
     return [Alarm("slack", level, text)]
 

@@ -162,7 +162,7 @@ def _no_log(data: bytes) -> str:
         instead = "it begins as a log of a vehicle does: expected its name to end in .bin"
     elif data.startswith(b"\x1f\x8b"):
         instead = "it is compressed: unpack it with gunzip"
-    return f"has no positions: no telemetry log, for no MAVLink message is in it; {instead}"
+    return f"has no positions: not a telemetry log, because it holds no MAVLink message; {instead}"
 
 
 @dataclass
@@ -234,7 +234,7 @@ class _Recording:
         if len(placed) > 1:
             names = " and ".join(str(v.system) for v in placed)
             raise InputError(
-                f"{where}: systems {names} tell positions; expected one of them with "
+                f"{where}: systems {names} send positions; expected one of them with "
                 + " or ".join(f"--system {v.system}" for v in placed)
             )
         return placed[0] if placed else next(iter(self.vehicles.values()))

@@ -309,7 +309,7 @@ class Session:
         if self._check is not None and self._fault is None:
             self._fault = self._check(self._latest)
             if self._latest.time < before - self.policy.max_clock_step_s:
-                self._fault = "the vehicle has started anew"
+                self._fault = "the vehicle has restarted"
 
     def _note_station(self, message: Any) -> None:
         """Note the heartbeat of another ground station, which the vehicle or a router passes on."""

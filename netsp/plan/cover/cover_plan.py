@@ -168,7 +168,7 @@ def cover(
         patches = coarsen(fine, camera.patch)
         mission = mission.model_copy(update={"start": tuple(start_place.tolist())})
         reach = clock.bounded(
-            "finding where the robot gets to",
+            "finding where the robot can go",
             lambda: _Reach.build(mission, scene, field, patches, standoff, policy),
         )
         viewer = Viewer(
@@ -186,7 +186,7 @@ def cover(
         found = find_viewpoints(viewer, np.random.default_rng(seed), search_clock, report)
         if not len(found) or not found.sees.any():
             raise InputError(
-                "inspect: nothing of the surface can be seen from where the robot gets to; "
+                "inspect: no part of the surface can be seen from where the robot can go; "
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
         report(f"choosing among {len(found)} viewpoints")

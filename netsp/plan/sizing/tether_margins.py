@@ -216,7 +216,7 @@ def _max_growth(problem: Problem, solution: Solution, policy: SizingPolicy) -> t
     low, high = 0.0, max(float(gaps.min()), 0.0)
     i, k = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
     place = "the base" if k == 0 else problem.goal_label(int(k) - 1)
-    nearer = "would be nearer than the clearance to" if problem.clearance else "would lie in"
+    nearer = "would be within the clearance of" if problem.clearance else "would lie in"
     reason = f"{place} {nearer} {problem.obstacle_label(int(i))}"
     high *= 1.0 - 1e-9
     if high <= 0.0:
@@ -245,7 +245,7 @@ def _misfit(problem: Problem, solution: Solution, growth: float) -> str | None:
         try:
             length = paths.length(0, visit.goal + 1, visit.signature)
         except NetspError:
-            return f"{label}: no tether of its class fits any more, or its way is closed"
+            return f"{label}: no tether of its class fits any more, or its path is closed"
         if length > problem.tether_length * (1.0 + 1e-12):
             return f"{label}: its tether does not fit any more"
     return None

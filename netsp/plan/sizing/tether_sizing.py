@@ -331,5 +331,5 @@ def _solve_step(
         result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
     left_out = graph.min_tether_left_out
     bound_left_out = graph.min_length_by_tether(left_out) if left_out <= limit else math.inf
-    because = "a tour by way of a class left out goes along its tether and back"
+    because = "a tour through a class left out goes along its tether and back"
     return with_classes_left_out(result, bound_left_out, Scope.ALL_TOURS, because), vertices

@@ -669,7 +669,7 @@ def _candidates(run: _Run, scene: Scene | None, whole_tether: bool) -> Iterator[
     best, is_complete = search.best_along_taut_legs()
     if not search.board.reached_waypoints:
         raise InputError(
-            f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
+            f"waypoints: the robot reaches none of them with its clearance of {mission.clearance:g}"
         )
     is_proven = best is not None and best[0].status is Status.OPTIMAL and is_complete
     shorter = search.shorter(best and best[1], is_proven)

@@ -281,7 +281,7 @@ def _class_lines(words: dict[str, Any] | None) -> list[str]:
         return []
     home = words["home"]
     if home is None:
-        at_home = "none told at home"
+        at_home = "not known at home"
     else:
         at_home = f"NOT empty at home: {home}" if home else "empty at home"
     return [

@@ -218,7 +218,7 @@ byId("correct").addEventListener("submit", async (event) => {
   const side = /** @type {HTMLSelectElement} */ (byId("side")).value;
   const obstacle = /** @type {HTMLSelectElement} */ (byId("obstacle")).value;
   const answer = await fetch("correct", { method: "POST", body: JSON.stringify({ side, obstacle }) });
-  byId("said").textContent = answer.ok ? `told: ${side} of ${obstacle}` : "not taken";
+  byId("said").textContent = answer.ok ? `noted: ${side} of ${obstacle}` : "not taken";
 });
 
 if (site.events) {
@@ -238,7 +238,7 @@ byId("event").addEventListener("submit", async (event) => {
   };
   const body = JSON.stringify({ [kind]: values[/** @type {keyof typeof values} */ (kind)] });
   const answer = await fetch("event", { method: "POST", body });
-  byId("heard").textContent = answer.ok ? `told: ${body}` : "not taken";
+  byId("heard").textContent = answer.ok ? `noted: ${body}` : "not taken";
 });
 
 export {};
