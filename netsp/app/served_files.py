@@ -77,7 +77,7 @@ class ImportAnswers:
     crs
         Coordinate system, as ``EPSG:32632`` or ``local``.
     viewpoints
-        Viewpoints about each obstacle.
+        Viewpoints around each obstacle.
     standoff
         Distance of viewpoints from its surface, metres.
     units

@@ -489,7 +489,7 @@ FLY = Command(
     ),
     LINK,
     Option("--dry-run", "show what would be sent, and send nothing"),
-    Option("--system N", "system id of the vehicle; others are not listened to", system_id, 1),
+    Option("--system N", "system id of the vehicle; others are ignored", system_id, 1),
     Option(
         "--any-vehicle",
         "command any vehicle, not only an ArduPilot submarine; for experts: others use the same "
@@ -513,7 +513,8 @@ FLY = Command(
     ),
     surprises("events during the flight"),
     Option(
-        "--events", 'read events from standard input, one JSON object a line: {"cancel_goal": "A3"}'
+        "--events",
+        'read events from standard input, one JSON object per line: {"cancel_goal": "A3"}',
     ),
     page("serve a page on this computer that shows the flight and accepts events"),
     Option(
@@ -678,7 +679,7 @@ IMPORT = Command(
     ),
     Option(
         "--crs SYSTEM",
-        "coordinate system of a file that names none, as EPSG:32632; local for a plane",
+        "coordinate system of a file that names none, such as EPSG:32632; local for a plane",
     ),
     Option(
         "--units UNIT",
@@ -723,8 +724,8 @@ IMPORT = Command(
     ),
     Input(
         "--candidates TABLE",
-        "places where the base may stand (columns as for --goals); cropping keeps all that is in "
-        "reach of any of them",
+        "places where the base may stand (columns as for --goals); cropping keeps everything "
+        "within reach of any of them",
     ),
     Group("charts", CHARTS),
     Group("occupancy images", IMAGES),
@@ -811,7 +812,7 @@ LIBRARY = Command(
     "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl",
     Option(
         "{list,check,rank}",
-        "list the problems with the best known of each; check solutions against them; rank solvers",
+        "list the problems with their best known tours; check solutions against them; rank solvers",
         dest="action",
     ),
     Option("[FILE...]", "check: solution files (JSON)", dest="files"),

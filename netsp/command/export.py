@@ -37,7 +37,7 @@ def _problem(args: argparse.Namespace) -> int:
     if args.problem is None:
         read_text(args.solution)  # a file that cannot be read is refused by its own message
         raise InputError(
-            f"{args.solution} is no planned mission; give the problem of a tour with --problem FILE"
+            f"{args.solution} is not a planned mission; give the tour's problem with --problem FILE"
         )
     problem, solution = load_verified_pair(args.problem, args.solution)
     if args.depth is not None:

@@ -30,7 +30,7 @@ export function edits(page, link) {
   const HINTS = {
     goal: "click where the goals are; with keys: arrows move the cross, Space puts a goal there",
     circle: "drag from the centre, or click; with keys: arrows move the cross, Space puts a circle there",
-    polygon: "click its corners, the first again to finish; with keys: arrows, Space, then Enter",
+    polygon: "click its corners, then the first one again to finish; with keys: arrows, Space, then Enter",
     path: "click the points of a path, or hold and draw; end the path at the base; Ctrl+Z removes the last stroke",
     bounds: "drag a rectangle",
   };

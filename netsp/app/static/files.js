@@ -10,9 +10,9 @@ const LABELS = {
   tether: "Tether length (m)",
   radius: "Radius of obstacles that are points (m)",
   line_width: "Width of open lines that are obstacles (m)",
-  crs: "Coordinate system (as EPSG:32632, or local)",
+  crs: "Coordinate system (such as EPSG:32632, or local)",
   units: "Unit of lengths in the file (m, mm, cm, ft, in, …)",
-  viewpoints: "Viewpoints about each obstacle",
+  viewpoints: "Viewpoints around each obstacle",
   standoff: "Distance of viewpoints from the obstacle (m)",
 };
 

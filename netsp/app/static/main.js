@@ -54,7 +54,7 @@ async function edit(change) {
 
 /** @param {any} message */
 function heard(message) {
-  if (message.connected === false) { by("answer").textContent = "the server is gone; trying again"; return; }
+  if (message.connected === false) { by("answer").textContent = "the connection to the server is lost; trying again"; return; }
   if (message.state) {
     const other = page.version !== message.state.version;
     Object.assign(page, message.state);

@@ -161,7 +161,7 @@ function margins(page) {
     element("td", (s.turning * 180 / Math.PI).toFixed(0)), element("td", s.clearance?.toFixed(2) ?? "")));
   return [element("h2", "Margins"),
     element("p", (m.obstacles === null ? "There are no obstacles; "
-      : `Any one of these is harmless: every obstacle off its place by up to ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot off its path by ${m.cross_track?.toFixed(2) ?? "any number of"} m, `)
+      : `Any one of these is harmless: every obstacle out of place by up to ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot off its path by ${m.cross_track?.toFixed(2) ?? "any number of"} m, `)
       + `a tether shorter by ${m.tether.toFixed(2)} m.`),
     element("table", element("tr", element("th", ""), element("th", "goal"), element("th", "slack m"), element("th", "turns °"), element("th", "clear m")), ...stops)];
 }
@@ -243,7 +243,7 @@ function tetherSlider(page, set) {
   input.setAttribute("list", "least");
   const enough = Math.ceil(least * 100 + 1e-6) / 100;
   const take = element("button", `shortest that reaches every goal: ${enough.toFixed(2)} m`);
-  take.title = "with it the tour may be another, and longer";
+  take.title = "with this length the tour may be different, and longer";
   take.addEventListener("click", () => set(["tether_length"], enough));
   return [row, marked, take];
 }

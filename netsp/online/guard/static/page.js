@@ -211,7 +211,7 @@ function drawSlack() {
 
 const stream = new EventSource("reports");
 stream.onmessage = (event) => show(JSON.parse(event.data));
-stream.onerror = () => { byId("state").textContent = "the guard has ended, or is not heard"; };
+stream.onerror = () => { byId("state").textContent = "the guard has ended, or cannot be reached"; };
 
 byId("correct").addEventListener("submit", async (event) => {
   event.preventDefault();
