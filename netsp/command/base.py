@@ -50,9 +50,9 @@ def run(args: argparse.Namespace) -> int:
             tour = "-"
         elif c.status is None and not search.proven:
             status = "not solved"
-        x, y, _ = c.position
+        x, y = (f"{v:.6g}" if abs(v) < 1e5 else f"{v:.2f}" for v in c.position[:2])  # UTM: 1 cm
         print(
-            f"{k:>4}  {c.name:<12.12} {x:>10.6g} {y:>10.6g} {c.shortest_tether:>10.6g} "
+            f"{k:>4}  {c.name:<12.12} {x:>10} {y:>10} {c.shortest_tether:>10.6g} "
             f"{tour:>12}  {status}"
         )
     solved = sum(c.length is not None for c in search.candidates)
@@ -69,7 +69,11 @@ def run(args: argparse.Namespace) -> int:
         style.save(search.plot()[0].figure, args.plot)
         print(f"picture {args.plot}", file=sys.stderr)
     if search.best_problem is None:
-        messages.warning("no place has a tour")
+        at_x, at_y = problem.base[:2]
+        messages.warning(
+            "no place has a tour; places are in the coordinates of the problem, whose base is at "
+            f"{at_x:.10g}, {at_y:.10g}"
+        )
         return EXIT_INFEASIBLE if not any(c.possible for c in search.candidates) else EXIT_NOT_ALL
     if args.problem_output:
         write_text(args.problem_output, search.best_problem.to_json())
