@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from netsp import Problem, Status, solve, verify
+from netsp.base.errors import InfeasibleError
 from netsp.hsignature import is_looping
 from tests.brute import BruteForce
 
@@ -42,6 +43,12 @@ def far_pair_short_tether():
     return min(4 * over, 2 * over + around(d, d, 2, 2 * pi - 2 * tilt))
 
 
+def winding_wall():
+    to_end = 7 * pi / 4 - atan2(0.1, 1.1)
+    corners = hypot(0.4, 1.1) + 3.2 + 2.2 + 2.2 + 1.2
+    return 2 * (corners + around(hypot(1.1, 0.1), sqrt(0.5), 0.3, to_end))
+
+
 FORMULAS = {
     "open-water": lambda: 10.0,
     "triangle": lambda: 12.0,
@@ -58,6 +65,7 @@ FORMULAS = {
     "against-the-wall": lambda: 2 * around(5, hypot(5, 0.5), 2, pi + atan2(0.5, 5)),
     "overlap": lambda: 2 * (2 * sqrt(4.5**2 - 4) + 3 + 2 * 2 * asin(2 / 4.5)),
     "depth-only": lambda: 2 * hypot(8 + 6 * asin(0.6), 6),
+    "winding-wall": winding_wall,
 }
 
 
@@ -117,6 +125,16 @@ def test_the_shortest_tour_of_the_double_spiral_needs_a_looping_class():
     restricted = solve(problem, roadmap_options={"classes": "non-looping"})
     assert restricted.status is Status.OPTIMAL_OF_KEPT
     assert restricted.lower_bound > 1.02 * shortest.length
+
+
+def test_the_non_looping_rule_can_leave_no_tour_and_the_message_says_why():
+    """A goal behind a winding wall: Proposition 10 (b) of docs/theory."""
+    problem = Problem.load(KNOWN / "winding-wall.json")
+    tour = solve(problem)
+    assert [visit.signature for visit in tour.tour] == [(2, 2)]
+    with pytest.raises(InfeasibleError, match="leaves out every class") as caught:
+        solve(problem, roadmap_options={"classes": "non-looping"})
+    assert "expected at least" not in str(caught.value)
 
 
 def test_the_plain_tour_of_the_entangling_pair_is_shorter_and_wrapped():

@@ -95,6 +95,12 @@ def unreached_error(problem: Problem, needed: Floats, missing: list[int]) -> Inf
             if g == missing[0]:
                 enclosing = around
             parts.append(f"{label} cannot be reached with a tether of any length: {why}")
+        elif needed[g] <= problem.tether_length:
+            parts.append(
+                f"{label} has a tether of {needed[g]:.6f}, within the tether_length of "
+                f"{problem.tether_length:g}, but the rule for classes leaves out every class that "
+                "fits; allow all classes, or lengthen the tether"
+            )
         else:
             shortest = math.ceil(needed[g] * 1e6) / 1e6
             parts.append(
