@@ -4,10 +4,10 @@ The estimate is off by a drift that changes slowly and is normal with a standard
 drift is put on a grid of offsets: a hypothesis is an offset and the word of the tether if the robot
 is off by it. A step of the estimate moves all offsets alike, and each writes the letters of its own
 step. The drift is a random walk between neighbouring offsets that forgets. An offset that puts the
-robot into an obstacle becomes less likely by its depth. So this is the forward algorithm of a
-hidden Markov model (Rabiner 1989, section III.A) whose states are places of the covering space.
-With
-no obstacle near, all offsets of a word write alike, and one word stands for them.
+robot into an obstacle becomes less likely by its depth, once for each stay. But for this rule, it
+is the forward algorithm of a hidden Markov model (Rabiner 1989, section III.A) whose states are
+places with words. With no obstacle near, one word at the estimate stands for all offsets
+(Propositions G3 and G4 of docs/theory).
 """
 
 from __future__ import annotations
