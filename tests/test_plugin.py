@@ -15,6 +15,7 @@ import pytest
 import shapely
 
 from netsp import (
+    Circle,
     InputError,
     Problem,
     Solution,
@@ -25,6 +26,7 @@ from netsp import (
     travel_graph,
     verify,
 )
+from netsp.base.errors import PluginError
 from netsp.base.number_ranges import check_not_negative
 from netsp.base.registry import Registry
 from netsp.command.main import main
@@ -246,6 +248,17 @@ def test_what_other_packages_raise_is_told_in_one_line(tmp_path):
     assert plain.returncode == 0, plain.stderr
 
 
+def post_scene():
+    return Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]})
+
+
+def post_mission():
+    return Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
+        waypoints=[(-2, 1, 0), (-2, 2, 0)], speed=0.5,
+    )  # fmt: skip
+
+
 def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     seen = []
 
@@ -259,12 +272,7 @@ def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     class Straight(Planner):
         name = "straight on"
 
-    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [POST]})
-    mission = Mission(
-        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
-        waypoints=[(-2, 1, 0), (-2, 2, 0)], speed=0.5,
-    )  # fmt: skip
-    run = simulate(mission, Straight, tether=Mine, scene=scene)
+    run = simulate(post_mission(), Straight, tether=Mine, scene=post_scene())
     assert run.planner == "straight on"
     assert run.summary["visited"] == 2
     assert len(seen) > 10
@@ -310,6 +318,122 @@ def test_a_plain_function_is_a_roadmap():
         solve(problem, roadmap=nearest_classes, roadmap_options={"size": 1})
     with pytest.raises(InputError, match="expected a TravelGraph from it, got 5"):
         solve(problem, roadmap=lambda problem: 5)
+
+
+class MatrixLegs:
+    """Legs of a matrix of lengths, drawn straight."""
+
+    def __init__(self, points, costs):
+        self.points, self.costs = points, costs
+
+    def lengths(self, vertices, wanted=None, clock=None):
+        return self.costs[np.ix_(vertices, vertices)]
+
+    def to_base(self):
+        return self.costs[0]
+
+    def lower_bounds(self, vertices, rows=None, clock=None):
+        bounds = self.lengths(vertices)
+        return bounds if rows is None else bounds[rows]
+
+    def path(self, u, v):
+        return self.points[[u, v]]
+
+
+class MatrixRoadmap:
+    """Roadmap whose travel graph has faults that tests put in."""
+
+    def __init__(self, change=lambda costs: costs, n_words=None, tether=1.0, legs=MatrixLegs):
+        self.change, self.n_words, self.tether, self.legs = change, n_words, tether, legs
+
+    def __call__(self, problem):
+        points = problem.points
+        costs = np.linalg.norm(points[:, None] - points, axis=2)
+        np.fill_diagonal(costs, np.inf)
+        n = len(points)
+        words = [()] * (n if self.n_words is None else self.n_words)
+        legs = self.legs(points, self.change(costs))
+        return TravelGraph(range(n), words, np.full(n, self.tether), legs)
+
+
+@pytest.mark.parametrize(
+    ("faults", "said"),
+    [
+        ({"change": lambda c: np.full_like(c, np.nan)}, "is nan; expected no negative number"),
+        ({"change": lambda c: c - 99.0}, "expected no negative number"),
+        ({"change": lambda c: c + np.triu(np.ones_like(c))}, "expected a symmetric matrix"),
+        ({"n_words": 1}, "1 signatures and 4 tethers; expected one of each for every vertex, 4"),
+        ({"tether": np.nan}, r"tethers\[0\] is nan; expected a length"),
+        ({"legs": lambda points, costs: None}, "None has no method 'lengths'"),
+    ],
+)
+def test_a_roadmap_that_makes_no_travel_graph_is_refused_in_one_line(faults, said):
+    problem = Problem(base=(0, 0), goals=[(3, 4), (6, 0), (4, -3)], tether_length=8)
+    assert solve(problem, roadmap=MatrixRoadmap()).length == solve(problem).length
+    with pytest.raises(InputError, match=said):
+        solve(problem, roadmap=MatrixRoadmap(**faults))
+
+
+@pytest.mark.parametrize(
+    ("part", "made", "said"),
+    [
+        ("planner", lambda: None, "too many positional arguments; expected a callable with the"),
+        ("planner", lambda *args: None, "has no method 'plan'"),
+        ("tether", lambda field: None, r"arguments \(field, delta\)"),
+        ("tether", lambda field, delta: None, "expected start, update, drive, lay"),
+        ("vehicle", lambda: None, r"arguments \(place, speed\)"),
+        ("vehicle", lambda place, speed: None, "has no method 'go'; expected go, stop_at"),
+    ],
+)
+def test_a_part_of_a_simulation_that_does_not_fit_is_refused_in_one_line(part, made, said):
+    with pytest.raises(InputError, match=f"^{part} .*{said}"):
+        simulate(post_mission(), scene=post_scene(), **{"planner": "none", part: made})
+
+
+def test_errors_of_parts_by_name_are_told_in_one_line_and_those_of_callables_pass(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "loud.py").write_text(
+        "from netsp.world.planner import Planner\n"
+        "class Loud(Planner):\n"
+        "    def step(self, robot, tether): raise ZeroDivisionError('step')\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(PluginError, match=r"planner 'loud:Loud' failed: ZeroDivisionError: step"):
+        simulate(post_mission(), "loud:Loud", scene=post_scene())
+    import loud
+
+    with pytest.raises(ZeroDivisionError, match="step"):
+        simulate(post_mission(), loud.Loud, scene=post_scene())
+
+
+@pytest.mark.parametrize("name", ["geojson", "dxf", "gpx", ".mine", "MINE", ""])
+def test_a_reader_of_maps_has_an_extension_of_its_own(name):
+    with pytest.raises(InputError, match=r"^map reader: "):
+        MAP_READERS[name] = lambda file: None
+
+
+@pytest.mark.parametrize(
+    ("feature", "said"),
+    [
+        ("x", "expected a Feature, got 'x'"),
+        (Feature("A[0]", "A", "", {}, None), r"A\[0\]: expected a shape, got None"),
+        (Feature("A[0]", "A", "", None, shapely.Point(0, 0)), "expected names with values"),
+        (Feature("A[0]", "A", "", {}, shapely.Point(math.nan, 0)), "expected finite coordinates"),
+    ],
+)
+def test_features_of_another_reader_are_checked(tmp_path, monkeypatch, feature, said):
+    found = Map((feature,), False, {"A": 1}, metres=1.0)
+    monkeypatch.setitem(MAP_READERS, "mine", lambda file: found)
+    (tmp_path / "site.mine").write_text("")
+    with pytest.raises(InputError, match=rf"reader of \.mine: .*{said}"):
+        read_site(tmp_path / "site.mine", tether=3.0)
+
+
+def test_a_model_names_its_fields_where_they_are_given_by_place():
+    with pytest.raises(TypeError, match=r"^Circle: expected fields by name: Circle\(center=…, rad"):
+        Circle((0, 4), 1)
 
 
 def test_a_roadmap_of_another_module_is_given_the_seed_and_compared_in_studies(
@@ -561,8 +685,8 @@ def test_policies_are_read_from_nested_mappings_and_dotted_names(params, policy)
         ({"policy.cuts.round": 1}, "unknown option 'policy.cuts.round'; expected one of rounds"),
         ({"policy": {"cuts": {"rounds": 1.5}}}, "option 'policy.cuts.rounds': expected a whole"),
         ({"policy": {"cuts": {"rounds": -1}}}, "policy.cuts.rounds: expected a number that is not"),
-        ({"policy": 5}, "option 'policy': expected a mapping of cuts, size, got 5"),
-        ({"policy": Cuts()}, "option 'policy': expected a mapping of cuts, size, got"),
+        ({"policy": 5}, "option 'policy': got 5; expected a mapping of cuts, size"),
+        ({"policy": Cuts()}, r"option 'policy': got Cuts\(.*\); expected a mapping of cuts, size"),
     ],
 )
 def test_what_is_wrong_with_a_policy_is_named_by_its_path(params, said):

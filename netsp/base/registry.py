@@ -12,17 +12,19 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import inspect
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, MutableMapping
-from contextlib import contextmanager
-from functools import cached_property
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import cached_property, wraps
+from typing import Any, Generic, TypeVar, cast
 
 from netsp.base.errors import InputError, NetspError, PluginError
 
 R = TypeVar("R")
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 _REFERENCE = re.compile(r"[\w.]+:[\w.]+")
@@ -90,6 +92,10 @@ class Registry(MutableMapping[str, R], Generic[R]):
             )
         return self[name]
 
+    def is_foreign(self, name: str) -> bool:
+        """Return whether a name is that of a part of another package, or an object reference."""
+        return name not in self._builtin
+
     def _check_loads(self, reference: str) -> None:
         """Raise InputError unless an object reference can be imported.
 
@@ -105,9 +111,118 @@ class Registry(MutableMapping[str, R], Generic[R]):
                 raise InputError(f"{self.kind}: {reference}: cannot be loaded: {error}") from None
 
 
-def later(_name: str, reference: str) -> Callable[..., Any]:
+class Later:
+    """Function that imports an object reference when called, and calls the object."""
+
+    def __init__(self, name: str, reference: str) -> None:
+        self.name, self.reference = name, reference
+
+    @property
+    def is_ours(self) -> bool:
+        """True if the object is netsp's own."""
+        return re.split("[.:]", self.reference)[0] == "netsp"
+
+    def __call__(self, *args: Any, **options: Any) -> Any:
+        """Return what the object returns."""
+        return load(self.reference)(*args, **options)
+
+
+def later(name: str, reference: str) -> Callable[..., Any]:
     """Return a function that imports an object reference when called, and calls the object."""
-    return lambda *args, **options: load(reference)(*args, **options)
+    return Later(name, reference)
+
+
+def load_target(factory: Callable[..., Any]) -> Any:
+    """Return the object that `later` calls; other callables as they are."""
+    return load(factory.reference) if isinstance(factory, Later) else factory
+
+
+def make_part(
+    kind: str, factory: Callable[..., Any], arguments: Mapping[str, Any], methods: Sequence[str]
+) -> Any:
+    """Return what the factory of a part makes, such as a planner.
+
+    Parameters
+    ----------
+    arguments : mapping
+        Arguments by the names that a message has for them; they are passed by position.
+    methods : sequence of str
+        Methods that the part must have.
+
+    Raises
+    ------
+    InputError
+        The factory cannot be called with these arguments, or the part lacks a method.
+    PluginError
+        The factory is named by an object reference of another package, and raises an error.
+    """
+    named = factory if isinstance(factory, Later) else None
+    what = f"{kind} {named.name if named else getattr(factory, '__name__', factory)!r}"
+    with foreign(f"{what} failed") if named and not named.is_ours else nullcontext():
+        build = load_target(factory)
+        check_callable(what, build, [*arguments])
+        made = build(*arguments.values())
+        missing = [m for m in methods if not callable(getattr(made, m, None))]
+        if missing:
+            raise InputError(f"{what}: has no method {missing[0]!r}; expected {', '.join(methods)}")
+        return made
+
+
+def blame_plugins(**registries: Registry[Any]) -> Callable[[F], F]:
+    """Return a decorator that turns errors of a call into PluginErrors if other packages have parts
+    in it.
+
+    Parameters
+    ----------
+    **registries : Registry
+        Registry of each parameter that names a part. Only names count, as those of the command
+        line; the errors of callables reach the caller as they are.
+    """
+
+    def decorate(call: F) -> F:
+        signature = inspect.signature(call)
+
+        @wraps(call)
+        def guarded(*args: Any, **options: Any) -> Any:
+            given = signature.bind(*args, **options).arguments
+            parts = [
+                f"{kind} {given[kind]!r}"
+                for kind, registry in registries.items()
+                if isinstance(given.get(kind), str) and registry.is_foreign(given[kind])
+            ]
+            with foreign(f"{', '.join(parts)} failed") if parts else nullcontext():
+                return call(*args, **options)
+
+        return cast(F, guarded)
+
+    return decorate
+
+
+def check_callable(
+    what: str, function: Any, arguments: Sequence[str], options: Mapping[str, Any] | None = None
+) -> None:
+    """Raise InputError unless an object can be called with some arguments.
+
+    Parameters
+    ----------
+    what : str
+        Beginning of the message.
+    arguments : sequence of str
+        Names for the arguments that are passed by position, for the message.
+    options : mapping, optional
+        Arguments that are passed by name.
+    """
+    expected = f"expected a callable with the arguments ({', '.join(arguments)})"
+    if not callable(function):
+        raise InputError(f"{what}: a {type(function).__name__} cannot be called; {expected}")
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # compiled: it has no signature
+        return
+    try:
+        signature.bind(*arguments, **(options or {}))
+    except TypeError as error:
+        raise InputError(f"{what}: {error}; {expected}") from None
 
 
 def load(reference: str) -> Any:

@@ -34,7 +34,10 @@ class Model(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    def __init__(self, /, **data: Any) -> None:
+    def __init__(self, /, *values: Any, **data: Any) -> None:
+        if values:
+            name, fields = type(self).__name__, ", ".join(f"{k}=…" for k in type(self).model_fields)
+            raise TypeError(f"{name}: expected fields by name: {name}({fields})")
         try:
             super().__init__(**data)
         except ValidationError as error:

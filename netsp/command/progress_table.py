@@ -10,7 +10,7 @@ from netsp.base.errors import counted
 from netsp.command.command_policy import CommandPolicy
 from netsp.gtsp.travel.result import Progress
 from netsp.model.problem import Problem
-from netsp.model.solution import Solution, Status
+from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
 
 _HEADER = (
     f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>9} {'of':>11} {'cuts':>6} "
@@ -122,7 +122,8 @@ def summary(
         f"total {t.total_s:.2f} s"
     )
     if solution.status is Status.INFEASIBLE:
-        return f"there is no tour ({times})"
+        along = "" if solution.roadmap in EXACT_ROADMAPS else f" along roadmap {solution.roadmap}"
+        return f"there is no tour{along} ({times})"
     if solution.length is None:
         return (
             f"no tour found by {solution.solver} ({times}); give it more time or more iterations, "

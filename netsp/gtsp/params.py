@@ -118,7 +118,7 @@ def _typed(what: str, value: Any, kind: Any) -> Any:
         return _whole(what, value)
     if _is_dataclass(kind) and not isinstance(value, kind):
         names = ", ".join(f.name for f in fields(kind))
-        raise InputError(f"{what}: expected a mapping of {names}, got {shown(value)}")
+        raise InputError(f"{what}: got {shown(value)}; expected a mapping of {names}")
     if kind is not float:
         return value
     try:

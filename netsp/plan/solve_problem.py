@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from netsp.base.clock import Clock, TimeLimit
-from netsp.base.errors import InputError, LimitReachedError
+from netsp.base.errors import InputError, LimitReachedError, counted
 from netsp.base.field_types import checked_argument
 from netsp.base.interrupt_signals import until_interrupt
-from netsp.base.registry import foreign, load
+from netsp.base.registry import check_callable, foreign, load
 from netsp.base.validated import shown
 from netsp.gtsp.instance import BaselessInstance, Instance
 from netsp.gtsp.limits import Limits
@@ -82,11 +82,14 @@ def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) 
     if unknown:
         choices = f"expected one of {', '.join(sorted(known))}" if known else "it takes none"
         raise InputError(f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; {choices}")
+    check_callable(f"roadmap {roadmap!r}", build, ["problem"], options)
     return build(problem, **options)
 
 
 def _option_names(build: Callable[..., Any]) -> set[str]:
     """Return the options of a roadmap: the keyword-only parameters of its factory."""
+    if not callable(build):
+        raise InputError(f"roadmap: expected a callable, got {shown(build)}")
     parameters = inspect.signature(build).parameters
     return {k for k, p in parameters.items() if p.kind == p.KEYWORD_ONLY}
 
@@ -155,16 +158,16 @@ def _graph_of_places(
     if isinstance(roadmap, str) and ROADMAPS.named(roadmap).ours:
         graph: TravelGraph = built.to_travel_graph()
     elif callable(roadmap):
-        graph = _foreign_graph(built, name_of(roadmap))
+        graph = _foreign_graph(built, name_of(roadmap), len(problem.goals))
     else:
         with foreign(f"roadmap {roadmap!r} failed"):
-            graph = _foreign_graph(built, roadmap)
+            graph = _foreign_graph(built, roadmap, len(problem.goals))
     graph.before = problem.precedences
     return graph
 
 
-def _foreign_graph(built: Any, name: str) -> TravelGraph:
-    """Return the travel graph of a roadmap of another package.
+def _foreign_graph(built: Any, name: str, n_goals: int) -> TravelGraph:
+    """Return the travel graph of a roadmap of another package, for some number of goals.
 
     Its bounds hold along this roadmap: netsp cannot check that the graph has all tours.
     """
@@ -174,6 +177,11 @@ def _foreign_graph(built: Any, name: str) -> TravelGraph:
     if not isinstance(graph, TravelGraph):
         got = shown(built if graph is None else graph)
         raise InputError(f"roadmap {name!r}: expected a TravelGraph from it, got {got}")
+    if graph.goal_count != n_goals:
+        raise InputError(
+            f"roadmap {name!r}: its travel graph has {counted(graph.goal_count, 'goal')}; expected "
+            f"those of the problem, {n_goals}"
+        )
     graph.declared_scope, graph.roadmap = Scope.ROADMAP, name
     return graph
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
+from netsp.base.errors import InputError
+from netsp.base.validated import shown
 from netsp.gtsp.cost_oracle import CostOracle, Estimate
 
 
@@ -59,9 +61,16 @@ class LegProvider(Protocol):
 
 
 class AdaptedLegs(Legs):
-    """Legs of a provider that does not derive from `Legs`."""
+    """Legs of a provider that does not derive from `Legs`. What it answers is checked."""
 
     def __init__(self, provider: LegProvider) -> None:
+        needed = ("lengths", "to_base", "lower_bounds", "path")
+        missing = [m for m in needed if not callable(getattr(provider, m, None))]
+        if missing:
+            raise InputError(
+                f"legs: {shown(provider)} has no method {missing[0]!r}; expected "
+                f"{', '.join(needed)}"
+            )
         self.provider = provider
         for name in ("estimate", "rounded", "blocks", "left_out", "bounds_of_left_out"):
             if hasattr(provider, name):
@@ -81,7 +90,28 @@ class AdaptedLegs(Legs):
         self, vertices: Ints, wanted: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """Return the lengths of the provider."""
-        return self.provider.lengths(vertices, wanted, clock)
+        lengths, k = self.provider.lengths(vertices, wanted, clock), len(vertices)
+        if (shape := np.shape(lengths)) != (k, k):
+            raise InputError(f"legs: lengths of {k} vertices: expected shape {k, k}, got {shape}")
+        wrong = ~(np.asarray(lengths) >= 0.0)
+        if wanted is not None:
+            wrong &= wanted
+        if wrong.any():
+            i, j = np.argwhere(wrong)[0]
+            raise InputError(
+                f"legs: length from vertex {vertices[i]} to {vertices[j]} is {lengths[i, j]}; "
+                "expected no negative number, inf where there is no leg"
+            )
+        differ = ~np.isclose(lengths, np.transpose(lengths))
+        if wanted is not None:
+            differ &= wanted
+        if differ.any():
+            i, j = np.argwhere(differ)[0]
+            raise InputError(
+                f"legs: length from vertex {vertices[i]} to {vertices[j]} is {lengths[i, j]:g}, "
+                f"and back {lengths[j, i]:g}; expected a symmetric matrix"
+            )
+        return lengths
 
     def pairs(self, us: Ints, vs: Ints, clock: Clock | None = None) -> Floats:
         """Return the lengths of single legs."""

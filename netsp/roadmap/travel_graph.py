@@ -128,6 +128,7 @@ class TravelGraph(Instance, Drawn):
     ) -> None:
         super().__init__(cluster, as_oracle(legs), signatures)
         self.tethers: Floats = np.asarray(tethers, dtype=float)
+        self._check_vertices()
         self.roadmap, self.classes, self.carrier = roadmap, classes, carrier
         self.min_tether_left_out = min_tether_left_out
         self.distance_oracle, self.parity_oracle = between, by_parity
@@ -136,6 +137,20 @@ class TravelGraph(Instance, Drawn):
         self._make_detours = detours
         self._detours: dict[bool, Detours] = {}
         self._place: dict[tuple[int, Word], int] | None = None
+
+    def _check_vertices(self) -> None:
+        """Raise InputError unless there is a word and a tether for every vertex."""
+        n = len(self.cluster)
+        if len(self.labels) != n or self.tethers.shape != (n,):
+            raise InputError(
+                f"graph: {len(self.labels)} signatures and {self.tethers.size} tethers; expected "
+                f"one of each for every vertex, {n}"
+            )
+        wrong = np.flatnonzero(~(self.tethers >= 0.0))
+        if len(wrong):
+            raise InputError(
+                f"graph: tethers[{wrong[0]}] is {self.tethers[wrong[0]]:g}; expected a length"
+            )
 
     @classmethod
     def from_costs(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from netsp.base.deprecated import deprecated_names
 from netsp.base.errors import InputError
-from netsp.base.registry import Registry, foreign, later
+from netsp.base.registry import Registry, check_callable, foreign, later, load_target
 from netsp.base.validated import shown
 from netsp.exchange.maps.chart_reader import is_chart, read_chart
 from netsp.exchange.maps.drawing import read_dxf
-from netsp.exchange.maps.feature import Map
+from netsp.exchange.maps.feature import Feature, Map
 from netsp.exchange.maps.fence_list import read_fence_list, read_rally_list
 from netsp.exchange.maps.geojson import read_geojson, read_geojson_sequence
 from netsp.exchange.maps.gpx import read_gpx_map
@@ -35,7 +37,25 @@ EARTH_READERS = {
 }
 """Readers of formats that are always in degrees, by extension."""
 
-MAP_READERS: Registry[Callable[[str], Map]] = Registry("map reader", "netsp.maps", {}, later)
+OTHER_SUFFIXES = (".dxf", ".kml", ".kmz", ".geojson", ".json")
+"""Extensions of the other formats that netsp reads itself."""
+
+
+class MapReaders(Registry[Callable[[str], Map]]):
+    """Readers of other packages by extension without the dot, each called with a path."""
+
+    def __setitem__(self, name: str, record: Callable[[str], Map]) -> None:
+        ours = (*EARTH_READERS, *SEQUENCE_SUFFIXES, *OTHER_SUFFIXES)
+        if not isinstance(name, str) or not name or name != name.lower().lstrip("."):
+            raise InputError(
+                f"map reader: got {shown(name)}; expected an extension in lower case, without dot"
+            )
+        if f".{name}" in ours:
+            raise InputError(f"map reader: {name!r} is read by netsp itself; expected another")
+        super().__setitem__(name, record)
+
+
+MAP_READERS: Registry[Callable[[str], Map]] = MapReaders("map reader", "netsp.maps", {}, later)
 """Readers of other packages by extension without the dot, each called with a path."""
 
 
@@ -90,10 +110,32 @@ def _read_by_plugin(file: str | Path, extension: str) -> Map:
     """Return the map that a reader of another package makes of a file."""
     what = f"{file}: reader of .{extension}"
     with foreign(f"{what} failed"):
-        found = MAP_READERS[extension](str(file))
+        reader = MAP_READERS[extension]
+        check_callable(what, load_target(reader), ["file"])
+        found = reader(str(file))
     if not isinstance(found, Map):
         raise InputError(f"{what}: expected a Map from it, got {shown(found)}")
+    for feature in found.features:
+        _check_feature(feature, what)
     return found
+
+
+def _check_feature(feature: object, what: str) -> None:
+    """Raise InputError unless a feature of another package has properties and a finite shape."""
+    import shapely
+
+    if not isinstance(feature, Feature):
+        raise InputError(f"{what}: expected a Feature, got {shown(feature)}")
+    where = f"{what}: {feature.where}"
+    if not isinstance(feature.properties, Mapping):
+        raise InputError(f"{where}: expected names with values, got {shown(feature.properties)}")
+    shape = feature.shape
+    if not isinstance(shape, shapely.Geometry) or shape.is_empty:
+        raise InputError(
+            f"{where}: expected a shape, got {shown(shape)}; name a feature without one in unread"
+        )
+    if not np.isfinite(shapely.get_coordinates(shape)).all():
+        raise InputError(f"{where}: expected finite coordinates, got {shown(shape)}")
 
 
 __getattr__ = deprecated_names(

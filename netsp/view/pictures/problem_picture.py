@@ -10,6 +10,7 @@ import numpy as np
 
 from netsp.base import progress
 from netsp.base.arrays import Floats
+from netsp.base.errors import InputError
 from netsp.gtsp.travel.result import Progress
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution, Status
@@ -134,6 +135,8 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
 
     from netsp.plan.solve_problem import build_roadmap
 
+    if roadmap not in ("taut", "prm"):
+        raise InputError(f"roadmap: no picture of {roadmap!r}; expected taut or prm")
     built = build_roadmap(problem, roadmap, **options)
     figure, ax = _single(problem)
     draw_map(problem, ax=ax)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from netsp.base.errors import InputError
-from netsp.base.registry import Registry, later
+from netsp.base.registry import Registry, later, make_part
 from netsp.world.mission.mission import Mission
 from netsp.world.paths.refine import REFINEMENTS
 from netsp.world.paths.sampled import OMPL_PLANNERS
@@ -48,7 +48,8 @@ def make_planner(
     ------
     InputError
         An unknown name of a planner, of path search or of refinement, a pivot spacing that is not
-        positive, or a tether model that the planner cannot use.
+        positive, or a tether model that the planner cannot use; a factory that takes other
+        arguments, or makes no planner.
     """
     options = options or PlannerOptions()
     make = name if callable(name) else PLANNERS.named(name)
@@ -60,7 +61,11 @@ def make_planner(
         raise InputError(f"pivot_spacing: expected more than 0, got {options.pivot_spacing!r}")
     if name in ("predictive", "repair") and not isinstance(tethers, GeodesicTether):
         raise InputError(f"tether: planner {name!r} needs geodesic, got {tethers.name!r}")
-    return make(mission, scene, tethers, grid, options)
+    arguments = {
+        "mission": mission, "field": scene, "tethers": tethers, "grid": grid, "options": options,
+    }  # fmt: skip
+    made: Planner = make_part("planner", make, arguments, ("plan", "step"))
+    return made
 
 
 __all__ = ["PLANNERS", "Command", "Planner", "PlannerOptions", "make_planner"]

@@ -13,13 +13,14 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.deprecated import deprecated_names
 from netsp.base.errors import InputError, is_interrupt
+from netsp.base.registry import blame_plugins
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
 from netsp.world.mission.run_log import LogRow, Run
 from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import Grid
-from netsp.world.planner import Command, Planner, PlannerOptions, make_planner
+from netsp.world.planner import PLANNERS, Command, Planner, PlannerOptions, make_planner
 from netsp.world.planner.planner import DONE, DWELL, WAIT
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
@@ -34,8 +35,8 @@ from netsp.world.simulator.stalls import Stalls
 from netsp.world.simulator.summary import summarise
 from netsp.world.simulator.surprises import SceneSurprises
 from netsp.world.simulator.surroundings import Surroundings
-from netsp.world.tether import GeodesicTether, make_tether
-from netsp.world.vehicle import VehicleFactory, make_vehicle
+from netsp.world.tether import TETHERS, GeodesicTether, make_tether
+from netsp.world.vehicle import VEHICLES, VehicleFactory, make_vehicle
 from netsp.world.vehicle.kinematic import wrapped_angle
 
 
@@ -80,6 +81,7 @@ def mission_grid_box(
     return low, high, cell
 
 
+@blame_plugins(planner=PLANNERS, vehicle=VEHICLES, tether=TETHERS)
 def simulate(
     mission: Mission,
     planner: str | Callable[..., Planner] = "predictive",

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy.typing as npt
 
 from netsp.base.arrays import Floats
-from netsp.base.registry import Registry, later
+from netsp.base.registry import Registry, later, make_part
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether.geodesic import GeodesicTether
 from netsp.world.tether.react_tether import ReactTether
@@ -93,9 +93,11 @@ def make_tether(
     Raises
     ------
     InputError
-        No model has that name.
+        No model has that name; a callable takes other arguments, or what it makes is no model.
     """
-    return (model if callable(model) else TETHERS.named(model))(field, delta)
+    factory = model if callable(model) else TETHERS.named(model)
+    arguments = {"field": field, "delta": delta}
+    return make_part("tether", factory, arguments, ("start", "update", "drive", "lay"))
 
 
 __all__ = [

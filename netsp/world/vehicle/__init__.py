@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from netsp.base.registry import Registry, later
+from netsp.base.registry import Registry, later, make_part
 from netsp.world.vehicle.kinematic import KinematicVehicle, Vehicle
 
 
@@ -33,9 +33,13 @@ def make_vehicle(
     Raises
     ------
     InputError
-        No vehicle has that name.
+        No vehicle has that name; a callable takes other arguments, or what it makes is no vehicle.
     """
-    return (vehicle if callable(vehicle) else VEHICLES.named(vehicle))(place, speed)
+    factory = vehicle if callable(vehicle) else VEHICLES.named(vehicle)
+    made: Vehicle = make_part(
+        "vehicle", factory, {"place": place, "speed": speed}, ("go", "stop_at")
+    )
+    return made
 
 
 __all__ = ["VEHICLES", "KinematicVehicle", "Vehicle", "VehicleFactory", "make_vehicle"]
