@@ -61,9 +61,8 @@ def make_planner(
         raise InputError(f"pivot_spacing: expected more than 0, got {options.pivot_spacing!r}")
     if name in ("predictive", "repair") and not isinstance(tethers, GeodesicTether):
         raise InputError(f"tether: planner {name!r} needs geodesic, got {tethers.name!r}")
-    arguments = {
-        "mission": mission, "field": scene, "tethers": tethers, "grid": grid, "options": options,
-    }  # fmt: skip
+    names = ("mission", "field", "tethers", "grid", "options")
+    arguments = dict(zip(names, (mission, scene, tethers, grid, options), strict=True))
     made: Planner = make_part("planner", make, arguments, ("plan", "step"))
     return made
 
