@@ -200,7 +200,7 @@ BAD = {
     "too near": (["--standoff", "0.1"], "standoff: 0.1 is nearer than the clearance"),
     "too far": (["--standoff", "5"], "standoff: 5 is farther than the camera sees"),
     "a solid that is not there": (["--inspect", "wreck"], "inspect: expected names of solids"),
-    "a tether that is too short": (["--tether", "0.5"], "nothing of the surface can be seen"),
+    "a tether that is too short": (["--tether", "0.5"], "no part of the surface can be seen"),
     "another picture": (["--plot", "x.bmp"], "x.bmp"),
 }
 

@@ -100,7 +100,7 @@ def test_another_ground_station_that_the_vehicle_counts_on_takes_over(tour):
     )
     assert "ground station" in why
     assert end + 20.0 <= session.simulation.now < end + 22.0
-    assert any("254" in text and "goes on" in text for text in said)
+    assert any("254" in text and "keeps the link alive" in text for text in said)
     session.close()
     session.begin_at(end + 60.0)
     assert session.heard("disarmed") == []

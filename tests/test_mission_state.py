@@ -76,7 +76,7 @@ def test_a_mission_from_the_middle_is_solved_judged_flown_and_reported(planned, 
     assert main(["export", str(out), "-o", str(tmp_path / "rest.csv")]) == 0
     capsys.readouterr()
     assert main(["execute", str(out), "-o", str(tmp_path / "run")]) == 0
-    assert "as planned at 2 of 2 stops; empty at home" in capsys.readouterr().err
+    assert "as planned at 2 of 2 visits; empty at home" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "run"), "-o", str(tmp_path / "run.html")]) == 0
     assert main(["report", str(out), "-o", str(tmp_path / "plan.html")]) == 0
     assert main(["plot", str(out), "-o", str(tmp_path / "plan.png")]) == 0

@@ -117,7 +117,7 @@ def test_a_planned_mission_is_written_and_read_and_flies(tmp_path, capsys):
     assert len(again.tour.stops) == 4
     assert main(["simulate", str(out)]) == 0
     said = capsys.readouterr()
-    assert "classes  as planned at 4 of 4 stops; empty at home" in said.err
+    assert "classes  as planned at 4 of 4 visits; empty at home" in said.err
     words = json.loads(said.out)["words"]
     assert words["home"] == []
     assert [stop["as_planned"] for stop in words["stops"]] == [True] * 4

@@ -117,8 +117,8 @@ class Alarms:
 
         Notes
         -----
-        Of a loop that is closed and the same loop ahead only the graver alarm is active: the loop
-        ahead is known from a look before the loop closed.
+        Alarms are lowered late. A loop ahead that is no reason any more, because the same loop is
+        closed, is not shown beside it.
         """
         by_kind = {a.kind: a for a in reasons}
         raised = []
@@ -129,18 +129,12 @@ class Alarms:
         self.active = {
             k: state.shown for k, state in self._states.items() if state.shown is not None
         }
-        repeated = _repeated_loop(self.active)
-        if repeated is not None:
-            del self.active[repeated]
-        if repeated == "loop-ahead":
-            raised = [a for a in raised if a.kind != repeated]
+        if "loop-ahead" not in by_kind and _has_closed(self.active):
+            del self.active["loop-ahead"]
         return sorted(raised, key=lambda a: -a.level)
 
 
-def _repeated_loop(active: Mapping[str, Alarm]) -> str | None:
-    """Return the less grave of two active alarms about one loop, ahead and closed, by its kind; of
-    two equal ones the loop ahead; None if there are no two."""
+def _has_closed(active: Mapping[str, Alarm]) -> bool:
+    """Return whether the loop ahead of one active alarm is the closed loop of another."""
     ahead, closed = active.get("loop-ahead"), active.get("loop")
-    if ahead is None or closed is None or not closed.around or ahead.around != closed.around:
-        return None
-    return "loop-ahead" if closed.level >= ahead.level else "loop"
+    return ahead is not None and closed is not None and ahead.around == closed.around != ()
