@@ -5,6 +5,7 @@
     python benchmarks/ablation.py --with scheduler         tasks that share the time, no routes
     python benchmarks/ablation.py --file FILE              each solve is kept as it comes
     python benchmarks/ablation.py --cpu-limits             on a machine that also does other work
+    python benchmarks/ablation.py --with scheduler --each  a row for each graph, medians over seeds
 
 Each graph is solved with all mechanisms and then without each, in one process, from a new travel
 graph. Times are CPU seconds of the solver, without the roadmap. Where both prove, times are
@@ -180,6 +181,21 @@ def table(
         sum(bool(b.failed) for _, b in pairs))  # fmt: skip
 
 
+def table_of_graphs(variant: str, known: dict[tuple[str, str, int], Outcome]) -> None:
+    """One row for each graph: proofs, and medians over the seeds."""
+    for graph in dict.fromkeys(g for g, v, _ in known if v == variant):
+        sides = [
+            [o for (g, v, _), o in known.items() if (g, v) == (graph, side)]
+            for side in (ALL, variant)
+        ]
+        seconds = [statistics.median(o.seconds for o in side) for side in sides]
+        gaps = [100.0 * max(statistics.median(o.gap for o in side), 0.0) for side in sides]
+        lengths = [statistics.median(o.length for o in side) for side in sides]
+        row(graph, *(sum(o.proven for o in side) for side in sides),
+            *(f"{s:.2f}" for s in seconds), *(f"{g:.2f}" for g in gaps),
+            f"{100.0 * (lengths[1] / lengths[0] - 1.0):+.2f}")  # fmt: skip
+
+
 def main() -> None:
     """Measure, and show a row for each mechanism."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -191,6 +207,8 @@ def main() -> None:
     parser.add_argument("--file", type=Path, help="file that keeps each solve")
     parser.add_argument("--min-seconds", type=float, default=0.1,
                         help="proofs that are quicker in both are not compared")  # fmt: skip
+    parser.add_argument("--each", action="store_true", help="a row for each graph")
+    parser.add_argument("--table", help="name of the table that --keep writes")
     args = parser.parse_args()
     wanted = args.without if args.without is not None else ([] if args.extra else [""])
     left_out = {m: o for m, o in MECHANISMS.items() if any(w in m for w in wanted)}
@@ -199,7 +217,13 @@ def main() -> None:
     solve_graph(travel_graph(random_world(1, goals=60, tether_length=300.0)))
     known = outcomes(variants, args.only, args.limit, args.seeds, args.file)
     heading("Mechanisms of auto")
-    name = "scheduler" if args.extra and not left_out else "ablation"
+    name = args.table or ("scheduler" if args.extra and not left_out else "ablation")
+    if args.each:
+        head("graph", "proven with all", "proven", "CPU s with all", "CPU s", "gap % with all",
+             "gap %", "length, % more", name=name)  # fmt: skip
+        for variant in list(variants)[1:]:
+            table_of_graphs(variant, known)
+        return
     head("variant", "solves", "proven with all", "proven", "CPU s with all", "CPU s",
          "ratio, median", "worst", "gap, % more, mean", "worst", "failed", name=name)  # fmt: skip
     for variant in variants:
