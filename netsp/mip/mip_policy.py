@@ -107,8 +107,6 @@ class PricingPolicy:
         Maximum number of legs that one pricing pass adds in all.
     candidates_per_vertex
         Legs of most negative reduced cost that a pricing pass keeps for each vertex.
-    max_repeats
-        Maximum number of times that pricing is repeated because legs got longer when measured.
     max_gap_ratio
         Reduced-cost fixing is skipped when the gap of this pass's bound exceeds the best gap by
         this factor: it would hardly fix a leg.
@@ -129,7 +127,6 @@ class PricingPolicy:
     max_new_legs_per_vertex: int = 3
     max_new_legs: int = 3000
     candidates_per_vertex: int = 8
-    max_repeats: int = 4
     max_gap_ratio: float = 1.5
     max_measured_legs: int = 1_000_000
     min_measured_use: float = 0.05

@@ -364,17 +364,13 @@ class Root:
         whose costs are too low.
         """
         longer = False
-        for _ in range(self.policy.pricing.max_repeats):
-            legs, price = prices.most_negative(tolerance)
-            missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
-            legs, price = legs[missing], price[missing]
-            if self.costs.measures_single_legs and self.costs.measure_legs(legs):
-                longer, price = True, prices.reduced_costs(legs)
-            negative = price < -tolerance
-            new = self._cheapest_per_vertex(legs[negative], price[negative])
-            if len(new) or not len(legs):
-                break
-        return new, longer
+        legs, price = prices.most_negative(tolerance)
+        missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
+        legs, price = legs[missing], price[missing]
+        if self.costs.measures_single_legs and self.costs.measure_legs(legs):
+            longer, price = True, prices.reduced_costs(legs)
+        negative = price < -tolerance
+        return self._cheapest_per_vertex(legs[negative], price[negative]), longer
 
     def _cheapest_per_vertex(self, legs: Ints, price: Floats) -> Ints:
         """Return the cheapest of legs (k, 2) by their prices (k,), a few of each vertex."""
