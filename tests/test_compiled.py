@@ -109,3 +109,32 @@ def test_files_of_sources_that_are_no_more_are_removed(tmp_path):
         KernelFile(str(tmp_path), "f", stamp).save(f"of {stamp}", "compiled")
     KernelFile(str(tmp_path), "g", "stamp").save("of floats", "compiled")
     assert len(list(tmp_path.glob("f.*.nbc"))) == len(list(tmp_path.glob("g.*.nbc"))) == 1
+
+
+FIRST_KERNEL = """
+import numpy as np
+from netsp.base.compiled.kernel import kernel
+
+@kernel
+def doubled(values, out):
+    for k in range(len(values)):
+        out[k] = 2.0 * values[k]
+    return len(values)
+
+values, out = np.ones(500), np.zeros(500)
+for _ in range(20_000):  # interpreted at first, then compiled
+    assert doubled(values, out) == 500
+print(out.sum())
+"""
+
+
+def test_the_first_function_that_a_process_compiles_may_be_a_kernel(tmp_path):
+    """Numba's runtime begins with it; begun by a kernel, every call of it went to address 0."""
+    (tmp_path / "first.py").write_text(FIRST_KERNEL)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NETSP_BACKGROUND": "0"}
+    for _ in range(2):  # compiled, then loaded from disk
+        done = subprocess.run(
+            [sys.executable, "first.py"], cwd=tmp_path, env=environment, capture_output=True,
+            text=True, timeout=120, check=False,
+        )  # fmt: skip
+        assert (done.returncode, done.stdout, done.stderr) == (0, "1000.0\n", "")

@@ -23,6 +23,7 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 
 LINKABLE = "linkable"
 """Kind of a saved library without machine code; Numba's own kinds are `object` and `bitcode`."""
@@ -170,6 +171,9 @@ def lazy_libraries() -> Iterator[None]:
     if not is_supported():
         yield
         return
+    # Numba begins its runtime with the first function that it compiles. If that is a kernel's, the
+    # runtime's own code is lazy, too: its symbols are unknown, and every call goes to address 0.
+    rtsys.initialize(cpu_target.target_context)
     codegen = cpu_target.target_context.codegen()
     before = codegen._library_class
     codegen._library_class = LazyLibrary
