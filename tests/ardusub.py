@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tests.autopilot import free_port
+from tests.autopilot import reserve_port
 
 BINARY = os.environ.get("NETSP_ARDUSUB", "")
 
@@ -34,7 +34,8 @@ class ArduSub:
     """The process, for a test; the ground station listens on `port`."""
 
     def __init__(self, pace: float = 1.0, parameters: dict[str, float] | None = None) -> None:
-        self.port, self.pace = free_port(), pace
+        self.reservation = reserve_port()
+        self.port, self.pace = int(self.reservation.getsockname()[1]), pace
         self.parameters = {**PARAMETERS, **(parameters or {})}
         self._folder = tempfile.TemporaryDirectory()
 
@@ -53,6 +54,7 @@ class ArduSub:
         self.process.kill()
         self.process.wait()
         self._folder.cleanup()
+        self.reservation.close()
 
     def until(self, condition: Callable[[], Any], seconds: float = 90.0) -> Any:
         """Wait for something to come true; seconds are those of the wall."""

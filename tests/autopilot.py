@@ -102,6 +102,9 @@ CIRCLE_BYTES = 13
 POLYGON_BYTES, VERTEX_BYTES = 2, 8
 """Bytes of a polygonal fence beside its vertices (type and count), and of each vertex."""
 
+TEST_PORTS = range(10_000, 14_000)
+"""UDP ports on which tests listen, below the ports that systems choose themselves."""
+
 DISARMED_BY_COMMAND, DISARMED_BY_GCS_FAILSAFE = 1, 18
 """Numbers of the methods of disarming in the vehicle's log (ARM.Method)."""
 
@@ -1916,12 +1919,12 @@ class Autopilot:
     def __init__(
         self,
         *,
-        port: int | None = None,
         estimate: bool = True,
         params: dict[str, float] | None = None,
         **options: float | Sequence[float],
     ) -> None:
-        self.port = port or free_port()
+        self.reservation = reserve_port()
+        self.port = int(self.reservation.getsockname()[1])
         self.rows: list[dict[str, Any]] = []
         self.events: list[dict[str, Any]] = []
         self.own = 0
@@ -1958,6 +1961,7 @@ class Autopilot:
             self.process.wait()
             self.reader.join(10.0)
             self.process.stdout.close()
+            self.reservation.close()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -2009,10 +2013,24 @@ class Autopilot:
         self.until(lambda: self.now >= end, 30.0 + simulated)
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
+def reserve_port() -> socket.socket:
+    """Return a TCP socket whose port is free for UDP on loopback until the socket is closed.
+
+    TCP and UDP number their ports apart, so the socket leaves the UDP port to the program under
+    test. Other tests skip the port, because they cannot bind its TCP socket. The system skips it
+    as well: it gives ports from `TEST_PORTS` to no socket that asks for any port.
+    """
+    for port in TEST_PORTS:
+        reservation = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            reservation.bind(("127.0.0.1", port))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                probe.bind(("127.0.0.1", port))
+        except OSError:
+            reservation.close()
+        else:
+            return reservation
+    raise OSError(f"no free UDP port from {TEST_PORTS[0]} to {TEST_PORTS[-1]}")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 import json
 import re
 import signal
-import socket
 import sys
 import threading
 from pathlib import Path
@@ -15,6 +14,7 @@ from netsp.command.main import COMMANDS, main
 from netsp.online.fly.flight_rehearsal import rehearse
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
+from tests.autopilot import reserve_port
 from tests.written_problems import written
 
 ROOT = Path(__file__).parent.parent
@@ -134,12 +134,9 @@ def _end(words, module, number, folder, inputs, monkeypatch, capsys):
     for file in inputs.iterdir():
         (folder / file.name).write_bytes(file.read_bytes())
     monkeypatch.chdir(folder)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        words = words.replace("{port}", str(free.getsockname()[1]))
     rehearse.cache_clear()  # another test of this process may have rehearsed already
-    with Pressed(number, module) as pressed:
-        code = main(words.split())
+    with reserve_port() as reservation, Pressed(number, module) as pressed:
+        code = main(words.replace("{port}", str(reservation.getsockname()[1])).split())
     assert pressed.sent, f"{words} entered no function of {module}"
     written = sorted(
         str(f.relative_to(folder))
