@@ -25,8 +25,8 @@ CEILINGS = {
     "unsaid": 0,
     "phrases": 0,
     "undocumented": 0,
-    "identifiers": 38,
-    "pronouns": 9,
+    "identifiers": 35,
+    "pronouns": 8,
     "skips": 29,
 }
 """Places that may break each rule, as counted by `python benchmarks/structure.py`. A change may
