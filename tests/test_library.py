@@ -217,6 +217,16 @@ def test_an_unverified_tour_never_ranks_as_short(small, tour):
     assert [e["solver"] for e in ranking(library, [short, honest])] == ["honest", "liar"]
 
 
+def test_an_excess_that_rounds_to_zero_is_printed_without_a_sign(small, tour, tmp_path, capsys):
+    with_records(small, tour)
+    rows = tmp_path / "rows.jsonl"
+    best = Library(small).records[SMALL].length
+    append_row(rows, Row(solver="lns", problem=SMALL, limit=1.0, seconds=0.1,
+                         length=best * (1.0 - 1e-9), verified=True))  # fmt: skip
+    assert main(["library", "rank", "--folder", str(small), "-o", str(rows)]) == 0
+    assert capsys.readouterr().out.split()[-3:-1] == ["0.000", "0.00"]
+
+
 def test_a_record_says_whether_it_is_proven():
     record = Record(problem="a", sha256="b", length=10.0, lower_bound=9.0, solver="s", by="me",
                     seconds=1.0, date="2026-11-25")  # fmt: skip

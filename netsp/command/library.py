@@ -156,7 +156,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
                     outcome = f"{row.length:.6g}"
                     if record:
                         outcome += (
-                            f", {100 * (row.length / record.length - 1):.3f} % above the best"
+                            f", {100 * (row.length / record.length - 1):z.3f} % above the best"
                         )
                 print(
                     f"[{k}/{len(names)}] {row.problem}: {outcome}, {row.seconds:.1f} s; "
@@ -179,7 +179,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
     for e in entries:
         print(
             f"{e['solver']:<16.16} {e['limit']:>8g} {e['problems']:>9} {e['verified']:>9} "
-            f"{e['best']:>12} {100 * e['above']:>14.3f} {100 * e['worst']:>9.2f} "
+            f"{e['best']:>12} {100 * e['above']:>z14.3f} {100 * e['worst']:>z9.2f} "
             f"{e['seconds']:>9.2f}"
         )
     return 0
