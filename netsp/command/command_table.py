@@ -469,7 +469,7 @@ ORDER = Command(
 
 FLY = Command(
     "carry out a tour with a vehicle, over MAVLink",
-    "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run",
+    "netsp fly problems/wharf.json tour.json --link udpin:0.0.0.0:14551 -o run",
     Input("[PROBLEM]", "problem file (JSON)"),
     Input("[TOUR]", "its solution file (JSON)", dest="solution"),
     Option(
@@ -537,7 +537,7 @@ FLY = Command(
 
 GUARD = Command(
     "watch the tether of a vehicle that somebody else drives",
-    "netsp guard problems/wharf.json --link udpin:14550 --page",
+    "netsp guard problems/wharf.json --link udpin:0.0.0.0:14551 --page",
     Input(
         "SITE",
         "problem file or mission file (JSON); with a planned mission, the guard also says whether "
