@@ -1,0 +1,1 @@
+"""Proofs of lower bounds, for `netsp_check` to check."""
