@@ -254,7 +254,7 @@ class Bound:
             child, node, beyond = -1, vertices[u].node, 0.0
             while node >= 0:
                 # first the vertices in the node itself, then those behind its other edges
-                branches = [] if child >= 0 else [(node, node + 1, -vertices[u].reach)]
+                branches = [] if child >= 0 else [(node, node + 1, math.inf)]
                 d = node + 1 if child < 0 else end[child]
                 while d < end[node]:
                     branches.append((d, end[d], nodes[d].farthest))

@@ -27,6 +27,10 @@ NEGATIVE_TOLERANCE = 1e-9
 """Tolerance, as a share of the target, below zero for the reduced cost of a leg that is priced
 in."""
 
+REACH_ROOM = 1e-6
+"""Tolerance, as a share of the target, by which the reach of a stage is larger than needed, because
+some costs are estimates here."""
+
 
 @dataclass(frozen=True)
 class SearchPolicy:
@@ -139,10 +143,12 @@ class DualSearch:
         struck = self._add_stage(root, _stage(point.duals, lp.cuts, {}), vertices, legs)
         left = np.argwhere(np.triu(struck.legs))
         instance.settle(left, self._check)
-        self.lp = self._relaxation(left)
-        self.lp.add_cuts(list(lp.cuts))
         if len(left):
-            self._branch(root, struck.vertices, np.ones(len(left), dtype=bool), ())
+            # with the legs of the tour the LP has a solution, whatever is struck out
+            self.lp = self._relaxation(np.unique(np.vstack([left, tour_legs(self.tour)]), axis=0))
+            self.lp.add_cuts(list(lp.cuts))
+            u, v = self.lp.legs.T
+            self._branch(root, struck.vertices, struck.legs[u, v], ())
         return root
 
     # the root over all legs
@@ -171,8 +177,6 @@ class DualSearch:
         idle, best = 0, -np.inf
         while True:
             point = self._solve(lp)
-            if point is None:
-                raise LimitReachedError("an LP failed")
             if self._price(lp, point, legs):
                 continue
             self.on_round(point.objective)
@@ -226,8 +230,6 @@ class DualSearch:
                 if self.leaves > self.policy.max_leaves:
                     raise LimitReachedError("the branching tree has too many leaves")
                 return
-            if point is None:
-                raise LimitReachedError("an LP without a solution did not close its leaf")
             if np.count_nonzero(alive) > self.policy.min_left * before:
                 break
         parts = self._choose(node, point, alive, adjacent)
@@ -237,20 +239,17 @@ class DualSearch:
             ends[self.lp.legs[some]] = True
             self._branch(node.children[-1], vertices & ends, some, pairs)
 
-    def _cut(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Point | None:
-        """Return the LP's last point after rounds of cuts; None if it has no solution."""
+    def _cut(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Point:
+        """Return the LP's last point after rounds of cuts."""
         lp, idle, best = self.lp, 0, -np.inf
-        lp.set_costs(self._costs(adjacent))
-        lp.set_alive(alive)
+        lp.set_costs(self._costs(alive, adjacent))
         while True:
             point = self._solve(lp)
-            if point is None:
-                return None
             bound = point.objective + self._charge * len(adjacent)
             gap, rise = self.target - bound, bound - best
             idle = 0 if rise > self.policy.min_rise * max(gap, 0.0) else idle + 1
             best = max(best, bound)
-            is_whole = float(np.minimum(point.y, 1.0 - point.y).max(initial=0.0)) < 1e-6
+            is_whole = bool(np.minimum(point.y, 1.0 - point.y).max(initial=0.0) < 1e-6)
             if gap <= 0.0 or (idle > self.policy.max_idle_rounds and not is_whole):
                 return point
             cuts = self._separate(point, lp, deep=idle < 2)
@@ -262,7 +261,7 @@ class DualSearch:
     def _strike_out(
         self,
         node: ProofNode,
-        point: Point | None,
+        point: Point,
         vertices: Bools,
         alive: Bools,
         adjacent: tuple[Pair, ...],
@@ -271,28 +270,10 @@ class DualSearch:
         legs = np.zeros_like(self.instance.costs, dtype=bool)
         u, v = self.lp.legs[alive].T
         legs[u, v] = legs[v, u] = True
-        if point is not None:
-            pairs = dict.fromkeys(adjacent, round(self._charge))
-            stage = _stage(point.duals, self.lp.cuts, pairs)
-            struck = self._add_stage(node, stage, vertices, legs)
-        else:
-            struck = self._add_ray(node, vertices, legs)
+        pairs = dict.fromkeys(adjacent, round(self._charge))
+        struck = self._add_stage(node, _stage(point.duals, self.lp.cuts, pairs), vertices, legs)
         u, v = self.lp.legs.T
         return struck.vertices, alive & struck.legs[u, v]
-
-    def _add_ray(self, node: ProofNode, vertices: Bools, legs: Bools) -> Struck:
-        """Add the stage of a dual ray, which proves that a part of the tree holds no tour."""
-        for ray in self.lp.rays():
-            unit = _stage(ray, self.lp.cuts, {}, scale=2.0**20)
-            reduced = unit.reduced_costs(np.where(legs, 0.0, np.inf), self.instance.cluster)
-            low = np.where(legs, reduced, np.inf)
-            lowest = np.minimum.reduceat(low.min(axis=1)[np.argsort(self.instance.cluster, kind="stable")],
-                np.searchsorted(np.sort(self.instance.cluster), np.arange(len(unit.prices))))
-            bound = unit.constant() + float(lowest[np.isfinite(lowest)].sum())
-            if bound > 0.0:
-                stage = _stage(ray, self.lp.cuts, {}, scale=2.0**20 * 2.0 * self.target / bound)
-                return self._add_stage(node, stage, vertices, legs)
-        raise LimitReachedError("an LP without a solution has no ray")
 
     def _add_stage(
         self, node: ProofNode, stage: DualStage, vertices: Bools, legs: Bools
@@ -300,7 +281,8 @@ class DualSearch:
         instance = self.instance
         reduced = stage.reduced_costs(instance.costs, instance.cluster)
         short = stage.constant() - self.target
-        struck = strike_out(reduced, instance.cluster, vertices, legs, short)
+        room = REACH_ROOM * self.target
+        struck = strike_out(reduced, instance.cluster, vertices, legs, short, room)
         node.stages.append((stage, struck.reach))
         return struck
 
@@ -309,9 +291,10 @@ class DualSearch:
         """Discount of the legs between a pair that must be adjacent."""
         return float(round(0.5 * self.target))
 
-    def _costs(self, adjacent: tuple[Pair, ...]) -> Floats:
+    def _costs(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Floats:
+        """Return the costs of the LP's legs; legs that are struck out cost more than any tour."""
         u, v = self.lp.legs.T
-        costs = self.instance.costs[u, v].copy()
+        costs = np.where(alive, self.instance.costs[u, v], 10.0 * self.target)
         for g, h in adjacent:
             costs[self._is_between(g, h)] -= self._charge
         return np.asarray(costs)
@@ -331,7 +314,8 @@ class DualSearch:
             gains = []
             for some, pairs in parts:
                 self._check()
-                value = self.lp.probe(self._costs(pairs), some, self.policy.probe_steps)
+                every = np.ones_like(some)
+                value = self.lp.probe(self._costs(some, pairs), every, self.policy.probe_steps)
                 value += self._charge * (len(pairs) - len(adjacent))
                 gains.append(max(min(value, 2.0 * self.target) - point.objective, 1.0))
             if gains[0] * gains[1] > best_gain:
@@ -373,10 +357,12 @@ class DualSearch:
 
     # LPs
 
-    def _solve(self, lp: HighsRelaxation) -> Point | None:
+    def _solve(self, lp: HighsRelaxation) -> Point:
         self._check()
         point = lp.solve(self.clock)
         self._check()
+        if point is None:
+            raise LimitReachedError("an LP failed")
         return point
 
     def _check(self) -> None:

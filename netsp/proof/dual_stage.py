@@ -142,7 +142,9 @@ class Struck:
     reach: int
 
 
-def strike_out(reduced: Floats, cluster: Ints, vertices: Bools, legs: Bools, short: int) -> Struck:
+def strike_out(
+    reduced: Floats, cluster: Ints, vertices: Bools, legs: Bools, short: int, room: float = 0.0
+) -> Struck:
     """Return what a stage leaves over, as `netsp_check.dual_bound` finds it.
 
     Parameters
@@ -153,31 +155,63 @@ def strike_out(reduced: Floats, cluster: Ints, vertices: Bools, legs: Bools, sho
         What earlier stages left over.
     short
         Constant of the stage less the target.
+    room
+        By how much the reach is larger than needed.
     """
     r = np.where(legs, reduced, np.inf)
     lowest = np.sort(np.partition(r, 1, axis=1)[:, :2], axis=1)
-    reach = np.inf
-    for _ in range(2):
+    within = _Clipped(lowest, cluster, vertices, short)
+    if not within.has_left(np.inf):
+        reach = within.closing_reach(room)
+        return Struck(np.zeros_like(vertices), np.zeros_like(legs), 0, reach)
+    reach, needed = np.inf, 0.0
+    while True:
+        excess, above, left = within.values(reach)
         low = np.minimum(lowest, reach)
-        pair = np.where(vertices, low.sum(axis=1), np.inf)
-        cheapest = np.full(int(cluster.max()) + 1, np.inf)
-        np.minimum.at(cheapest, cluster, pair)
-        if not np.isfinite(cheapest).all():
-            return Struck(np.zeros_like(vertices), np.zeros_like(legs), 0, _finite(lowest))
-        excess = 2.0 * short + cheapest.sum()
-        above = -cheapest[cluster]
-        left = vertices & (excess + above + pair < 0.0)
-        if not left.any() or reach < np.inf:
+        needed = float(np.ceil(-0.5 * excess - (low[:, 0] + above)[left].min()))
+        if needed <= reach < np.inf:
             break
-        reach = np.ceil(-0.5 * excess - (low[:, 0] + above)[left].min()) + 1.0
-    reach = reach if np.isfinite(reach) else _finite(lowest)
+        reach = needed + np.ceil(room)
     other = np.where(r <= low[:, :1], low[:, 1:], low[:, :1])
     total = excess + above[:, None] + above[None, :] + 2.0 * r + other + other.T
     kept = legs & (r < reach) & (total < 0.0) & left[:, None] & left[None, :]
     return Struck(left, kept, int(excess), int(reach))
 
 
-def _finite(lowest: Floats) -> int:
-    """Return one more than the largest finite number."""
-    values = lowest[np.isfinite(lowest)]
-    return int(values.max(initial=0.0)) + 1
+@dataclass(frozen=True)
+class _Clipped:
+    """Bounds of a stage in which reduced costs beyond a reach count as the reach."""
+
+    lowest: Floats
+    cluster: Ints
+    vertices: Bools
+    short: int
+
+    def values(self, reach: float) -> tuple[float, Floats, Bools]:
+        """Return twice the bound less twice the target, the share of each vertex's cluster in it
+        (n,), negative, and the mask of the vertices left."""
+        low = np.where(self.vertices, np.minimum(self.lowest, reach).sum(axis=1), np.inf)
+        cheapest = np.full(int(self.cluster.max()) + 1, np.inf)
+        np.minimum.at(cheapest, self.cluster, low)
+        if not np.isfinite(cheapest).all():
+            return 0.0, -low, np.zeros_like(self.vertices)
+        excess = 2.0 * self.short + float(cheapest.sum())
+        above = -cheapest[self.cluster]
+        return excess, above, self.vertices & (excess + above + low < 0.0)
+
+    def has_left(self, reach: float) -> bool:
+        """Return whether vertices are left."""
+        return bool(self.values(reach)[2].any())
+
+    def closing_reach(self, room: float) -> int:
+        """Return a small reach with which no vertex is left."""
+        values = np.unique(self.lowest[np.isfinite(self.lowest)])
+        first, last = 0, len(values)
+        while first < last:
+            middle = (first + last) // 2
+            if self.has_left(values[middle]):
+                first = middle + 1
+            else:
+                last = middle
+        reach = values[first] if first < len(values) else values.max(initial=0.0)
+        return int(np.ceil(reach + room)) + 1
