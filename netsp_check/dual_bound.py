@@ -18,18 +18,19 @@ from netsp_check.problem_file import Refused
 
 Pair = tuple[int, int]
 
+UNLIMITED = 1 << 100
+"""Sentinel: more than any reduced cost."""
+
 SLACK = 64
 """Tolerance: grid units that cover the rounding of the distances in `Bound._near_legs`."""
 
 
 @dataclass
 class Cut:
-    """Cut with its multiplier, as sets of vertices (Lemmas 9 to 11).
+    """Cut, as sets of vertices (Lemmas 9 to 11).
 
     Attributes
     ----------
-    multiplier
-        Whole number, at least 0.
     inner, outer
         Masks of vertices: for a subtour cut S without C, and S; else both are the handle.
     pairs
@@ -40,7 +41,6 @@ class Cut:
         Right-hand side.
     """
 
-    multiplier: int
     inner: int
     outer: int
     pairs: frozenset[Pair] = frozenset()
@@ -50,27 +50,27 @@ class Cut:
 
 def read_cut(data: Any, cluster: Sequence[int]) -> Cut:
     """Return a cut of a proof after checking the conditions of its lemma."""
-    kind, multiplier, mask, more = data
-    inside, clusters = int(mask, 16), max(cluster) + 1
-    if not isinstance(multiplier, int) or multiplier < 0 or inside >> len(cluster):
-        raise Refused("cut: expected a multiplier of at least 0 and a set of vertices")
+    kind, mask, more = data
+    inside = int(mask, 16)
+    if inside < 0 or inside >> len(cluster):
+        raise Refused("cut: expected a set of vertices")
     if kind == "subtour":
         if inside & 1:
             raise Refused("subtour cut: expected a set without the base")
         own = sum(1 << v for v, c in enumerate(cluster) if c == more)
-        return Cut(multiplier, inside & ~own, inside)
+        return Cut(inside & ~own, inside)
     if kind == "parity":
         pairs = frozenset((min(g, h), max(g, h)) for g, h in more)
         if len(pairs) != len(more) or len(pairs) % 2 == 0 or any(g == h for g, h in pairs):
             raise Refused("parity cut: expected an odd number of distinct pairs")
-        return Cut(multiplier, inside, inside, pairs, True, 1 - len(pairs))
+        return Cut(inside, inside, pairs, True, 1 - len(pairs))
     if kind == "comb":
-        return _read_comb(multiplier, inside, [frozenset(t) for t in more], cluster)
+        return _read_comb(inside, [frozenset(t) for t in more], cluster)
     raise Refused(f"cut: unknown kind {kind!r}")
 
 
 def _read_comb(
-    multiplier: int, inside: int, teeth: list[frozenset[int]], cluster: Sequence[int]
+    inside: int, teeth: list[frozenset[int]], cluster: Sequence[int]
 ) -> Cut:
     handle = {c for v, c in enumerate(cluster) if inside >> v & 1}
     if any(c in handle and not inside >> v & 1 for v, c in enumerate(cluster)):
@@ -83,7 +83,7 @@ def _read_comb(
         raise Refused("comb: expected teeth that are partly in the handle")
     pairs = frozenset((g, h) for t in teeth for g in t for h in t if g < h)
     constant = len(teeth) + 1 - 2 * sum(len(t) - 1 for t in teeth)
-    return Cut(multiplier, inside, inside, pairs, False, constant)
+    return Cut(inside, inside, pairs, False, constant)
 
 
 class Stage:
@@ -99,9 +99,14 @@ class Stage:
         Sum of the duals of each vertex.
     """
 
-    def __init__(self, data: dict[str, Any], cluster: Sequence[int], adjacent: set[Pair]) -> None:
-        prices, self.reach = data["a"], data["reach"]
-        self._cuts = [read_cut(c, cluster) for c in data["cuts"]]
+    def __init__(
+        self, data: dict[str, Any], cuts: list[Cut], cluster: Sequence[int], adjacent: set[Pair]
+    ) -> None:
+        prices, self.reach = data["a"], data.get("reach", UNLIMITED)
+        used = [(cuts[k], b) for k, b in data["cuts"]]
+        self._multipliers = [b for _, b in used]
+        if not all(isinstance(b, int) and b >= 0 for b in self._multipliers):
+            raise Refused("stage: expected multipliers of cuts of at least 0")
         self._pair_prices = {(min(g, h), max(g, h)): price for g, h, price in data.get("p", ())}
         whole = [*prices, self.reach, *self._pair_prices.values()]
         if len(prices) != max(cluster) + 1 or not all(isinstance(a, int) for a in whole):
@@ -109,13 +114,13 @@ class Stage:
         if not self._pair_prices.keys() <= adjacent:
             raise Refused("stage: has the price of a pair that need not be adjacent")
         self.constant = 2 * sum(prices) + sum(self._pair_prices.values())
-        self.constant += sum(c.multiplier * c.constant for c in self._cuts)
+        self.constant += sum(b * cut.constant for cut, b in used)
         self.potential = [prices[c] for c in cluster]
         self._inner, self._outer = [0] * len(cluster), [0] * len(cluster)
         self._teeth: dict[Pair, list[int]] = {}
-        for k, cut in enumerate(self._cuts):
+        for k, (cut, b) in enumerate(used):
             for v in bits(cut.inner):
-                self.potential[v] += cut.multiplier
+                self.potential[v] += b
                 self._inner[v] |= 1 << k
             for v in bits(cut.outer):
                 self._outer[v] |= 1 << k
@@ -129,11 +134,11 @@ class Stage:
         if out >= self.reach:
             return out
         twice = self._inner[u] & self._outer[v] | self._outer[u] & self._inner[v]
-        out += 2 * sum(self._cuts[k].multiplier for k in bits(twice))
+        out += 2 * sum(self._multipliers[k] for k in bits(twice))
         if pair in self._teeth:
             whole, crossing = self._teeth[pair]
             counted = whole | crossing & (self._inner[u] ^ self._inner[v])
-            out += 2 * sum(self._cuts[k].multiplier for k in bits(counted))
+            out += 2 * sum(self._multipliers[k] for k in bits(counted))
         return out
 
 
@@ -146,15 +151,18 @@ class Bound:
         Number of leaves of the branching tree that were closed.
     """
 
-    def __init__(self, tree: CoveringTree, legs: LegBounds, target: int) -> None:
-        self.tree, self.legs, self.target, self.leaves = tree, legs, target, 0
+    def __init__(self, tree: CoveringTree, legs: LegBounds, target: int | None) -> None:
+        self.tree, self.legs, self.leaves = tree, legs, 0
+        self.target = UNLIMITED if target is None else target
+        self._cuts: list[Cut] = []
         of_place = tree.triangulation.problem.cluster
         self.cluster = [of_place[v.place] for v in tree.vertices]
         self.clusters = max(of_place) + 1
         self._nodes = [v.node for v in tree.vertices]
 
-    def check(self, node: dict[str, Any]) -> None:
-        """Check a branching tree; refuse it if a leaf is not closed."""
+    def check(self, node: dict[str, Any], cuts: list[Any]) -> None:
+        """Check a branching tree over a table of cuts; refuse it if a leaf is not closed."""
+        self._cuts = [read_cut(cut, self.cluster) for cut in cuts]
         alive = self.reachable()
         if self.clusters == 2 and len(alive) > 1:
             raise Refused("there may be a shorter tour to the goal and back")
@@ -173,7 +181,7 @@ class Bound:
         for data in node.get("stages", ()):
             if not self._is_possible(alive):
                 break
-            stage = Stage(data, self.cluster, adjacent)
+            stage = Stage(data, self._cuts, self.cluster, adjacent)
             alive, legs = self._strike_out(stage, alive, legs)
         if not self._is_possible(alive):
             self.leaves += 1
@@ -207,6 +215,8 @@ class Bound:
         self, stage: Stage, alive: set[int], legs: set[Pair] | None
     ) -> tuple[set[int], set[Pair]]:
         """Return the vertices and legs that a tour shorter than the target may use (Lemma 13)."""
+        if legs is not None:
+            stage.reach = UNLIMITED
         price = {}
         for u, v in self._near_legs(stage, alive) if legs is None else legs:
             r = self._price(stage, u, v)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +25,7 @@ class Checked:
     Attributes
     ----------
     bound : float
-        In the problem's units.
+        Length in the problem's units; inf if there is no tour.
     margin, slack : float
         Length by which obstacles are grown, and share of the tether that is kept in reserve.
     vertices, legs, leaves : int
@@ -71,8 +72,10 @@ def cover(problem_text: str, proof: dict[str, Any]) -> tuple[Problem, CoveringTr
     bridges = [((a, b), (c, d)) for a, b, c, d in proof.get("bridges", ())]
     triangulation = Triangulation(problem, points, triangles, proof.get("box"), bridges)
     # a tour to a class is at least twice as long as the tether there (Lemma 12)
-    reach = min(float(problem.tether), proof["target"] / 2.0) + 1.0
-    return problem, CoveringTree(triangulation, reach, MAX_NODES)
+    reach = float(problem.tether)
+    if proof["target"] is not None:
+        reach = min(reach, proof["target"] / 2.0)
+    return problem, CoveringTree(triangulation, reach + 1.0, MAX_NODES)
 
 
 def check(problem_text: str, proof_data: bytes) -> Checked:
@@ -94,10 +97,11 @@ def _check(problem_text: str, proof: dict[str, Any]) -> Checked:
     if proof["classes"] != [len(tree.vertices), tree.digest()]:
         raise Refused("classes: the proof is about others; it belongs to another problem")
     legs = LegBounds(tree)
-    bound = Bound(tree, legs, int(proof["target"]))
-    bound.check(proof["tree"])
+    target = proof["target"]
+    bound = Bound(tree, legs, None if target is None else int(target))
+    bound.check(proof["tree"], proof.get("cuts", []))
     return Checked(
-        bound=proof["target"] * 2.0**-problem.grid,
+        bound=math.inf if target is None else target * 2.0**-problem.grid,
         margin=float(proof.get("margin", 0.0)),
         slack=float(proof.get("slack", 0.0)),
         vertices=len(tree.vertices),

@@ -52,6 +52,7 @@ class CoverInstance:
         at = [known.get((p, w), -1) for p, w in zip(place.tolist(), self.labels, strict=True)]
         self.at: Ints = np.array(at, dtype=np.int64)
         self.costs = self._estimates(graph, check)
+        self._is_settled: Bools = np.zeros(self.costs.shape, dtype=bool)
 
     def rows_of(self, graph_vertices: Iterable[int]) -> list[int] | None:
         """Return the rows of vertices of the travel graph; None if one is missing."""
@@ -61,9 +62,11 @@ class CoverInstance:
 
     def settle(self, legs: Ints, check: Callable[[], None] = lambda: None) -> None:
         """Replace the estimates of legs (k, 2) by the checker's bounds."""
+        legs = legs[~self._is_settled[legs[:, 0], legs[:, 1]]]
         names = self.vertices[legs].tolist()
         for (i, j), (u, v) in zip(legs.tolist(), names, strict=True):
             check()
+            self._is_settled[i, j] = self._is_settled[j, i] = True
             self.costs[i, j] = self.costs[j, i] = self.legs.bound(u, v, 2)
 
     def _word(self, problem: Problem, vertex: int) -> Word:

@@ -21,7 +21,7 @@ from netsp.mip.program import Duals, Point
 from netsp.mip.root import tour_legs
 from netsp.mip.subtours import fractional_cuts, label_families
 from netsp.proof.cover_instance import CoverInstance
-from netsp.proof.dual_stage import DualStage, Pair, Struck, strike_out
+from netsp.proof.dual_stage import CutTable, DualStage, Pair, Struck, strike_out
 
 NEGATIVE_TOLERANCE = 1e-9
 """Tolerance, as a share of the target, below zero for the reduced cost of a leg that is priced
@@ -32,8 +32,12 @@ REACH_ROOM = 1e-6
 some costs are estimates here."""
 
 
+class ShorterTourError(Exception):
+    """A tour over the checker's bounds on legs is shorter than the target."""
+
+
 @dataclass(frozen=True)
-class SearchPolicy:
+class DualSearchPolicy:
     """Policy of the search for a proof.
 
     Attributes
@@ -80,7 +84,7 @@ class ProofNode:
         Branches: apart and next for a pair, without and at for a vertex.
     """
 
-    stages: list[tuple[DualStage, int]] = field(default_factory=list)
+    stages: list[tuple[DualStage, int | None]] = field(default_factory=list)
     pair: Pair | None = None
     vertex: int | None = None
     children: list[ProofNode] = field(default_factory=list)
@@ -89,16 +93,28 @@ class ProofNode:
         """Return the number of leaves."""
         return sum(c.leaves() for c in self.children) or 1
 
-    def to_json(self, vertices: Ints, cluster: Ints) -> dict[str, Any]:
-        """Return the node as a proof holds it (`DualStage.to_json`)."""
-        stages = [stage.to_json(vertices, cluster, reach) for stage, reach in self.stages]
-        out: dict[str, Any] = {"stages": stages}
+    def to_fields(self, instance: CoverInstance, cluster: list[int]) -> dict[str, Any]:
+        """Return the tree and the table of its cuts as a proof holds them.
+
+        Parameters
+        ----------
+        instance
+            Instance that the rows of the stages belong to.
+        cluster
+            Cluster of each vertex of the cover.
+        """
+        table = CutTable(instance.vertices, np.array(cluster))
+        return {"tree": self._to_json(table), "cuts": table.rows}
+
+    def _to_json(self, table: CutTable) -> dict[str, Any]:
+        out: dict[str, Any] = {"stages": [s.to_json(table, reach) for s, reach in self.stages]}
         if self.children:
-            parts = [c.to_json(vertices, cluster) for c in self.children]
+            parts = [c._to_json(table) for c in self.children]
             if self.pair is not None:
                 out |= {"pair": list(self.pair), "apart": parts[0], "next": parts[1]}
             else:
-                out |= {"vertex": int(vertices[self.vertex]), "without": parts[0], "at": parts[1]}
+                vertex = int(table.vertices[self.vertex])
+                out |= {"vertex": vertex, "without": parts[0], "at": parts[1]}
         return out
 
 
@@ -108,7 +124,9 @@ class DualSearch:
     Attributes
     ----------
     on_round
-        Called with the bound, in grid units, after each round of the root.
+        Called with the LP's bound, in grid units, after each round of the root.
+    root_bound
+        Bound of the root, in grid units; 0 before there is one.
     """
 
     def __init__(
@@ -117,7 +135,7 @@ class DualSearch:
         tour: list[int],
         target: int,
         clock: Clock,
-        policy: SearchPolicy = SearchPolicy(),
+        policy: DualSearchPolicy = DualSearchPolicy(),
         mip: MipPolicy = MipPolicy(),
         on_round: Callable[[float], None] = lambda bound: None,
     ) -> None:
@@ -125,7 +143,7 @@ class DualSearch:
         self.policy, self.mip, self.on_round = policy, mip, on_round
         self.branch = label_families(instance.labels)
         self.odd = odd_numbers(instance.labels)
-        self.leaves = 0
+        self.leaves, self.root_bound = 0, 0.0
 
     def prove(self) -> ProofNode:
         """Return a branching tree whose leaves are all closed.
@@ -139,10 +157,15 @@ class DualSearch:
         vertices = np.ones(len(instance.cluster), dtype=bool)
         legs = np.isfinite(instance.costs)
         lp = self._relaxation(self._first_legs())
-        point = self._price_and_cut(lp, legs)
-        struck = self._add_stage(root, _stage(point.duals, lp.cuts, {}), vertices, legs)
+        while True:
+            point = self._price_and_cut(lp, legs)
+            stage = _stage(point.duals, lp.cuts, {})
+            if not self._settle(stage, vertices, legs):
+                break
+            lp.set_costs(instance.costs[lp.legs[:, 0], lp.legs[:, 1]])
+        self.root_bound = point.objective
+        struck = self._add_stage(root, stage, vertices, legs, REACH_ROOM * self.target)
         left = np.argwhere(np.triu(struck.legs))
-        instance.settle(left, self._check)
         if len(left):
             # with the legs of the tour the LP has a solution, whatever is struck out
             self.lp = self._relaxation(np.unique(np.vstack([left, tour_legs(self.tour)]), axis=0))
@@ -235,9 +258,7 @@ class DualSearch:
         parts = self._choose(node, point, alive, adjacent)
         for some, pairs in parts:
             node.children.append(ProofNode())
-            ends = np.zeros_like(vertices)
-            ends[self.lp.legs[some]] = True
-            self._branch(node.children[-1], vertices & ends, some, pairs)
+            self._branch(node.children[-1], vertices, some, pairs)
 
     def _cut(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Point:
         """Return the LP's last point after rounds of cuts."""
@@ -275,13 +296,32 @@ class DualSearch:
         u, v = self.lp.legs.T
         return struck.vertices, alive & struck.legs[u, v]
 
-    def _add_stage(
-        self, node: ProofNode, stage: DualStage, vertices: Bools, legs: Bools
-    ) -> Struck:
+    def _settle(self, stage: DualStage, vertices: Bools, legs: Bools) -> bool:
+        """Settle the costs of all legs within the reach of a stage, and return whether one fell
+        by so much that the LP should be solved again."""
         instance = self.instance
         reduced = stage.reduced_costs(instance.costs, instance.cluster)
         short = stage.constant() - self.target
         room = REACH_ROOM * self.target
+        struck = strike_out(reduced, instance.cluster, vertices, legs, short, room)
+        assert struck.reach is not None
+        near = np.argwhere(np.triu(legs & (reduced < struck.reach)))
+        before = instance.costs[near[:, 0], near[:, 1]]
+        instance.settle(near, self._check)
+        after = instance.costs[near[:, 0], near[:, 1]]
+        return bool(np.abs(before - after).sum() > room)
+
+    def _add_stage(
+        self,
+        node: ProofNode,
+        stage: DualStage,
+        vertices: Bools,
+        legs: Bools,
+        room: float | None = None,
+    ) -> Struck:
+        instance = self.instance
+        reduced = stage.reduced_costs(instance.costs, instance.cluster)
+        short = stage.constant() - self.target
         struck = strike_out(reduced, instance.cluster, vertices, legs, short, room)
         node.stages.append((stage, struck.reach))
         return struck
@@ -321,7 +361,7 @@ class DualSearch:
             if gains[0] * gains[1] > best_gain:
                 best, best_gain = (pair, vertex, parts), gains[0] * gains[1]
         if best is None:
-            raise LimitReachedError("an LP with a whole solution did not close its leaf")
+            raise ShorterTourError
         node.pair, node.vertex, parts = best
         if node.pair is not None and node.pair[0]:
             inside = np.isin(self.instance.cluster, node.pair)

@@ -82,34 +82,51 @@ class DualStage:
         twice += of_pair[np.ix_(cluster, cluster)]
         return np.asarray(costs - potential[:, None] - potential[None, :] + 2.0 * twice)
 
-    def to_json(self, vertices: Ints, cluster: Ints, reach: int) -> dict[str, Any]:
-        """Return the stage as a proof holds it.
-
-        Parameters
-        ----------
-        vertices
-            (n,) indices in the cover of the rows of the cuts' sets.
-        cluster
-            Cluster of each vertex of the cover.
-        reach
-            Reach of the stage, of `strike_out`.
-        """
-        cuts = []
-        for cut, b in zip(self.cuts, self.multipliers, strict=True):
-            inside = vertices[cut.inside]
-            if not cut.teeth:
-                cuts.append(["subtour", b, _mask(inside), int(cut.cluster)])
-                continue
-            teeth = [list(t) for t in cut.teeth]
-            if is_crossing(cut):
-                cuts.append(["parity", b, _mask(inside), teeth])
-            else:
-                whole = np.flatnonzero(np.isin(cluster, cluster[inside]))
-                cuts.append(["comb", b, _mask(whole), teeth])
-        out: dict[str, Any] = {"a": self.prices.tolist(), "cuts": cuts, "reach": reach}
+    def to_json(self, table: CutTable, reach: int | None) -> dict[str, Any]:
+        """Return the stage as a proof holds it, with its cuts by their numbers in a table."""
+        numbers = [table.number(cut) for cut in self.cuts]
+        cuts = [[k, b] for k, b in zip(numbers, self.multipliers, strict=True)]
+        out: dict[str, Any] = {"a": self.prices.tolist(), "cuts": cuts}
+        if reach is not None:
+            out["reach"] = reach
         if self.pair_prices:
             out["p"] = [[g, h, price] for (g, h), price in self.pair_prices.items()]
         return out
+
+
+class CutTable:
+    """Cuts of a proof, each once.
+
+    Attributes
+    ----------
+    vertices
+        (n,) indices in the cover of the rows of the cuts' sets.
+    rows
+        Cuts as a proof holds them: kind, mask of vertices, and cluster or teeth.
+    """
+
+    def __init__(self, vertices: Ints, cluster: Ints) -> None:
+        self.vertices, self._cluster = vertices, cluster
+        self.rows: list[list[Any]] = []
+        self._numbers: dict[str, int] = {}
+
+    def number(self, cut: Cut) -> int:
+        """Return the number of a cut, which is added if it is new."""
+        row = self._row(cut)
+        number = self._numbers.setdefault(repr(row), len(self.rows))
+        if number == len(self.rows):
+            self.rows.append(row)
+        return number
+
+    def _row(self, cut: Cut) -> list[Any]:
+        inside = self.vertices[cut.inside]
+        if not cut.teeth:
+            return ["subtour", _mask(inside), int(cut.cluster)]
+        teeth = [[int(c) for c in t] for t in cut.teeth]
+        if is_crossing(cut):
+            return ["parity", _mask(inside), teeth]
+        whole = np.flatnonzero(np.isin(self._cluster, self._cluster[inside]))
+        return ["comb", _mask(whole), teeth]
 
 
 def is_crossing(cut: Cut) -> bool:
@@ -130,20 +147,22 @@ class Struck:
     ----------
     vertices, legs
         Masks (n,) and (n, n) of what is left.
-    excess
-        Twice the bound, less twice the target.
     reach
-        Reach that the stage needs.
+        Reach that the stage needs; None if it needs none.
     """
 
     vertices: Bools
     legs: Bools
-    excess: int
-    reach: int
+    reach: int | None
 
 
 def strike_out(
-    reduced: Floats, cluster: Ints, vertices: Bools, legs: Bools, short: int, room: float = 0.0
+    reduced: Floats,
+    cluster: Ints,
+    vertices: Bools,
+    legs: Bools,
+    short: int,
+    room: float | None = None,
 ) -> Struck:
     """Return what a stage leaves over, as `netsp_check.dual_bound` finds it.
 
@@ -156,26 +175,24 @@ def strike_out(
     short
         Constant of the stage less the target.
     room
-        By how much the reach is larger than needed.
+        By how much the reach is larger than needed; None for a stage over known legs, which needs
+        no reach.
     """
     r = np.where(legs, reduced, np.inf)
     lowest = np.sort(np.partition(r, 1, axis=1)[:, :2], axis=1)
     within = _Clipped(lowest, cluster, vertices, short)
     if not within.has_left(np.inf):
-        reach = within.closing_reach(room)
-        return Struck(np.zeros_like(vertices), np.zeros_like(legs), 0, reach)
-    reach, needed = np.inf, 0.0
-    while True:
-        excess, above, left = within.values(reach)
-        low = np.minimum(lowest, reach)
-        needed = float(np.ceil(-0.5 * excess - (low[:, 0] + above)[left].min()))
-        if needed <= reach < np.inf:
-            break
-        reach = needed + np.ceil(room)
+        reach = None if room is None else within.closing_reach(room)
+        return Struck(np.zeros_like(vertices), np.zeros_like(legs), reach)
+    reach = None if room is None else within.open_reach(room)
+    limit = np.inf if reach is None else float(reach)
+    excess, above, left = within.values(limit)
+    low = np.minimum(lowest, limit)
     other = np.where(r <= low[:, :1], low[:, 1:], low[:, :1])
-    total = excess + above[:, None] + above[None, :] + 2.0 * r + other + other.T
-    kept = legs & (r < reach) & (total < 0.0) & left[:, None] & left[None, :]
-    return Struck(left, kept, int(excess), int(reach))
+    with np.errstate(invalid="ignore"):  # vertices without legs are not left
+        total = excess + above[:, None] + above[None, :] + 2.0 * r + other + other.T
+    kept = legs & (r < limit) & (total < 0.0) & left[:, None] & left[None, :]
+    return Struck(left, kept, reach)
 
 
 @dataclass(frozen=True)
@@ -202,6 +219,17 @@ class _Clipped:
     def has_left(self, reach: float) -> bool:
         """Return whether vertices are left."""
         return bool(self.values(reach)[2].any())
+
+    def open_reach(self, room: float) -> int:
+        """Return a reach beyond which all legs are struck out."""
+        reach = np.inf
+        while True:
+            excess, above, left = self.values(reach)
+            low = np.minimum(self.lowest[:, 0], reach)
+            needed = np.ceil(-0.5 * excess - (low + above)[left].min())
+            if needed <= reach < np.inf:
+                return int(reach)
+            reach = needed + np.ceil(room)
 
     def closing_reach(self, room: float) -> int:
         """Return a small reach with which no vertex is left."""
