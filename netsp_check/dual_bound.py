@@ -69,9 +69,7 @@ def read_cut(data: Any, cluster: Sequence[int]) -> Cut:
     raise Refused(f"cut: unknown kind {kind!r}")
 
 
-def _read_comb(
-    inside: int, teeth: list[frozenset[int]], cluster: Sequence[int]
-) -> Cut:
+def _read_comb(inside: int, teeth: list[frozenset[int]], cluster: Sequence[int]) -> Cut:
     handle = {c for v, c in enumerate(cluster) if inside >> v & 1}
     if any(c in handle and not inside >> v & 1 for v, c in enumerate(cluster)):
         raise Refused("comb: expected a handle of whole clusters")

@@ -98,7 +98,9 @@ def read_problem(text: str, grid: int, margin: float = 0.0, slack: float = 0.0) 
     obstacles = []
     for o in data.get("obstacles", ()):
         if "polygon" in o:
-            obstacles.append(Obstacle(tuple(exact(x, y) for x, y in o["polygon"]), clearance * scale))
+            obstacles.append(
+                Obstacle(tuple(exact(x, y) for x, y in o["polygon"]), clearance * scale)
+            )
         else:
             radius = Fraction(o["radius"]) + clearance
             obstacles.append(Obstacle((exact(*o["center"]),), radius * scale))

@@ -34,8 +34,9 @@ class Piece:
     def frame(self) -> tuple[float, ...]:
         """Return a box (x0, y0, x1, y1) that holds the piece, despite rounding."""
         reach = float(self.radius) * (1.0 + 1e-6) + 1.0
-        xs, ys = sorted((float(self.a[0]), float(self.b[0]))), sorted(
-            (float(self.a[1]), float(self.b[1]))
+        xs, ys = (
+            sorted((float(self.a[0]), float(self.b[0]))),
+            sorted((float(self.a[1]), float(self.b[1]))),
         )
         return xs[0] - reach, ys[0] - reach, xs[1] + reach, ys[1] + reach
 
@@ -113,7 +114,8 @@ class Triangulation:
         if not all(_encloses(low, high, p, p) for p in problem.places):
             raise Refused("box: does not hold the base and all goals")
         spans = [(o, *o.span()) for o in problem.obstacles]
-        return [o for o, first, last in spans if _encloses(low, high, first, last)]
+        inner = [v + 1 for v in low], [v - 1 for v in high]  # paths along the box must be free
+        return [o for o, first, last in spans if _encloses(*inner, first, last)]
 
     def _check_border(self) -> None:
         """Check that each edge without a neighbour is in obstacles, and away from places there."""
@@ -134,7 +136,7 @@ class Border:
     """Region in which edges without a neighbour must lie: obstacles, bridges, outside the box."""
 
     def __init__(self, problem: Problem, usable: list[Obstacle], box: list[int] | None) -> None:
-        self._places = problem.places
+        self._places, self._has_bounds = problem.places, box is None
         self._box = [Fraction(v) for v in box] if box is not None else list(problem.bounds or ())
         self._polygons = [o.corners for o in usable if len(o.corners) > 1]
         corners = [Piece(c, c, o.growth) for o in usable for c in o.corners if o.growth > 0]
@@ -148,7 +150,7 @@ class Border:
         first, last = _exact(a), _exact(b)
         if distance2(first, last, last) > delta * delta:
             raise Refused(f"bridge {a}, {b}: is longer than δ")
-        if not (self.holds_point(first) and self.holds_point(last)):
+        if not all(self.holds_point(p) or self._is_beyond_bounds(p) for p in (first, last)):
             raise Refused(f"bridge {a}, {b}: an end is in no obstacle")
         if any(distance2(p, first, last) < 4 * delta * delta for p in self._places):
             raise Refused(f"bridge {a}, {b}: is less than 2 δ from the base or a goal")
@@ -160,6 +162,10 @@ class Border:
         x, y = float(p[0]), float(p[1])
         near = (q for q, f in self._pieces if f[0] <= x <= f[2] and f[1] <= y <= f[3])
         return any(q.holds(p) for q in near) or any(_inside(c, p, p) for c in self._polygons)
+
+    def _is_beyond_bounds(self, p: Exact) -> bool:
+        """Return whether a point is outside the problem's bounds, and these are the box."""
+        return self._has_bounds and self._is_outside(p, p)
 
     def holder(self, a: Exact, b: Exact, halvings: int = 0) -> Piece | None:
         """Return a piece that holds an edge, None if it is held otherwise; refuse other edges."""
@@ -214,9 +220,7 @@ def _edges(corners: Sequence[Exact]) -> list[tuple[Exact, Exact]]:
     return [(corners[k - 1], c) for k, c in enumerate(corners)] if len(corners) > 1 else []
 
 
-def _encloses(
-    low: Sequence[Fraction], high: Sequence[Fraction], first: Exact, last: Exact
-) -> bool:
+def _encloses(low: Sequence[Fraction], high: Sequence[Fraction], first: Exact, last: Exact) -> bool:
     """Return whether the box from low to high holds the one from first to last."""
     return all(low[i] <= first[i] and last[i] <= high[i] for i in (0, 1))
 

@@ -208,7 +208,9 @@ class _Attempt:
         def on_round(bound: float) -> None:
             self.on_progress(f"bound {bound * 2.0**-self.grid:.6g}")
 
-        search = DualSearch(instance, tour, target, self.clock, self.policy.search, on_round=on_round)
+        search = DualSearch(
+            instance, tour, target, self.clock, self.policy.search, on_round=on_round
+        )
         try:
             return search.prove()
         finally:

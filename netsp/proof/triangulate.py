@@ -70,19 +70,21 @@ def triangulate(problem: Problem, corners: int) -> Mesh:
     """
     import shapely
 
-    box = _box(problem)
-    frame = box if box is not None else [float(v) for v in problem.bounds or ()]
-    shapes = [_inner_shape(o, corners) for o in problem.obstacles]
-    near = [k for k, o in enumerate(problem.obstacles) if box is None or _is_within(o, box)]
-    bridges = _bridges(problem, [shapes[k] for k in near])
-    pieces = [shapes[k] for k in near] + [_thin_box(b, problem) for b in bridges]
-    solid = shapely.union_all(pieces, grid_size=1.0)
-    places = [shapely.Point(round(x), round(y)) for x, y in problem.places]
     delta = float(problem.size) / RESOLUTION
-    free_ends = shapely.union_all([p.buffer(2.0 * delta, quad_segs=2) for p in places], grid_size=1.0)
-    solid = shapely.difference(solid, free_ends, grid_size=1.0)
-    outer = shapely.box(*(round(v) for v in _widened(frame, box is None)))
-    free = shapely.difference(outer, solid, grid_size=1.0)
+    box = _box(problem)
+    near = [o for o in problem.obstacles if box is None or _is_within(o, box)]
+    shapes = _inner_shapes(near, corners, delta)
+    if box is None:
+        assert problem.bounds is not None
+        shapes += _walls([float(v) for v in problem.bounds])
+    bridges = _bridges(shapes, delta)
+    slivers = [shapely.LineString(np.reshape(b, (2, 2))).buffer(0.5 * delta, 1) for b in bridges]
+    solid = shapely.union_all([*shapes, *slivers], grid_size=1.0)
+    places = [shapely.Point(round(x), round(y)) for x, y in problem.places]
+    holes = shapely.union_all([p.buffer(2.0 * delta, 2) for p in places], grid_size=1.0)
+    solid = shapely.difference(solid, holes, grid_size=1.0)
+    frame = box if box is not None else shapely.bounds(shapely.union_all(shapes)).tolist()
+    free = shapely.difference(shapely.box(*frame), solid, grid_size=1.0)
     parts = [g for g in shapely.get_parts(free) if g.geom_type == "Polygon"]
     base = next(g for g in parts if g.intersects(places[0]))
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(base))
@@ -128,46 +130,105 @@ def _is_within(o: Obstacle, box: Sequence[int]) -> bool:
     return all(box[i] <= first[i] and last[i] <= box[i + 2] for i in (0, 1))
 
 
-def _widened(frame: Sequence[float], is_bounds: bool) -> list[float]:
-    """Return a frame on the grid; that of bounds is not smaller than the bounds."""
-    if not is_bounds:
-        return list(frame)
-    return [*(math.floor(v) for v in frame[:2]), *(math.ceil(v) for v in frame[2:])]
-
-
-def _inner_shape(o: Obstacle, corners: int) -> shapely.Geometry:
-    """Return a polygon inside a grown obstacle, whose corners are on its outline."""
+def _walls(bounds: Sequence[float]) -> list[Any]:
+    """Return four boxes that surround the bounds."""
     import shapely
 
-    at = np.array([[float(x), float(y)] for x, y in o.corners])
-    growth = float(o.growth) - INSET
-    if len(at) == 1:
-        return shapely.Polygon(_on_circle(at[0], growth, corners))
-    plan = shapely.Polygon(at)
-    if growth <= 0.0:
-        return plan.buffer(-INSET, join_style="mitre")
-    edges = zip(np.roll(at, 1, axis=0), at, strict=True)
-    return shapely.union_all([plan, *(_stadium(a, b, growth, corners) for a, b in edges)], grid_size=1.0)
+    x0, y0, x1, y1 = (round(v) for v in bounds)
+    # on the grid, and not within the bounds
+    x0, y0 = x0 - (x0 > bounds[0]), y0 - (y0 > bounds[1])
+    x1, y1 = x1 + (x1 < bounds[2]), y1 + (y1 < bounds[3])
+    room = max(x1 - x0, y1 - y0)
+    return [
+        shapely.box(x0 - room, y0 - room, x0, y1 + room),
+        shapely.box(x1, y0 - room, x1 + room, y1 + room),
+        shapely.box(x0 - room, y0 - room, x1 + room, y0),
+        shapely.box(x0 - room, y1, x1 + room, y1 + room),
+    ]
 
 
-def _on_circle(center: Floats, radius: float, corners: int) -> Floats:
+def _inner_shapes(obstacles: Sequence[Obstacle], corners: int, delta: float) -> list[Any]:
+    """Return polygons inside grown obstacles, with corners where obstacles touch or overlap."""
+    import shapely
+
+    plans = [np.array([[float(x), float(y)] for x, y in o.corners]) for o in obstacles]
+    cores = [shapely.Polygon(p) if len(p) > 1 else shapely.Point(p[0]) for p in plans]
+    growths = [float(o.growth) for o in obstacles]
+    tree = shapely.STRtree(cores)
+    facing: list[list[Floats]] = [[] for _ in obstacles]
+    for i, core in enumerate(cores):
+        reach = growths[i] + max(growths) + delta
+        for j in tree.query(core.buffer(reach), predicate="intersects").tolist():
+            near = shapely.shortest_line(core, cores[j])
+            if j != i and near.length <= growths[i] + growths[j] + delta:
+                a, b = shapely.get_coordinates(near)
+                facing[i] += _contacts(a, b, growths[i], growths[j])
+    return [
+        _inner_shape(plan, growth - INSET, corners, contacts)
+        for plan, growth, contacts in zip(plans, growths, facing, strict=True)
+    ]
+
+
+def _contacts(a: Floats, b: Floats, radius: float, other: float) -> list[Floats]:
+    """Return the points of the rim about a that face b, and those where the rims cross."""
+    distance = float(np.hypot(*(b - a)))
+    if distance == 0.0:
+        return []
+    d = (b - a) / distance
+    out = [a + radius * d]
+    along = (distance**2 + radius**2 - other**2) / (2.0 * distance)
+    if abs(along) < radius:
+        across = math.sqrt(radius**2 - along**2) * np.array([-d[1], d[0]])
+        out += [a + along * d + across, a + along * d - across]
+    return out
+
+
+def _inner_shape(plan: Floats, radius: float, corners: int, contacts: list[Floats]) -> Any:
+    """Return a polygon inside a grown plan, whose corners are on its outline."""
+    import shapely
+
+    if len(plan) == 1:
+        return shapely.MultiPoint(_on_circle(plan[0], radius, corners, contacts)).convex_hull
+    core = shapely.Polygon(plan)
+    if radius <= 0.0:
+        return shapely.set_precision(core.buffer(-INSET, join_style="mitre"), 1.0)
+    edges = zip(np.roll(plan, 1, axis=0), plan, strict=True)
+    stadiums = [_stadium(a, b, radius, corners, contacts) for a, b in edges]
+    return shapely.union_all([core, *stadiums], grid_size=1.0)
+
+
+def _on_circle(center: Floats, radius: float, corners: int, contacts: list[Floats]) -> Floats:
+    """Return grid points of a circle: evenly spaced ones, and those nearest to its contacts."""
     angle = 2.0 * np.pi * np.arange(corners) / corners
-    return np.rint(center + radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+    rim = [np.column_stack([np.cos(angle), np.sin(angle)])]
+    for p in contacts:
+        d = float(np.hypot(*(p - center)))
+        if abs(d - radius) < 2.0 * INSET + 1e-12 * radius:
+            rim.append(((p - center) / d)[None])
+    return np.asarray(np.rint(center + radius * np.vstack(rim)))
 
 
-def _stadium(a: Floats, b: Floats, radius: float, corners: int) -> Any:
+def _stadium(a: Floats, b: Floats, radius: float, corners: int, contacts: list[Floats]) -> Any:
     """Return the hull of two circles' corners, and of the ends of the tangents between."""
     import shapely
 
     d = (b - a) / np.hypot(*(b - a))
     side = radius * np.array([-d[1], d[0]])
-    rims = [_on_circle(p, radius, corners) for p in (a, b)]
+    rims = [_on_circle(p, radius, corners, contacts) for p in (a, b)]
     ends = [np.rint(p + s * side) for p in (a, b) for s in (-1.0, 1.0)]
     return shapely.MultiPoint(np.vstack([*rims, *ends])).convex_hull
 
 
-def _bridges(problem: Problem, shapes: Sequence[Any]) -> list[list[int]]:
-    return []
+def _bridges(shapes: Sequence[Any], delta: float) -> list[list[int]]:
+    """Return segments on the grid that close the gaps of at most δ between shapes."""
+    import shapely
 
-
-def _thin_box(bridge: Sequence[int], problem: Problem) -> Any: ...
+    out = []
+    tree = shapely.STRtree(shapes)
+    for i, shape in enumerate(shapes):
+        near = tree.query(shape, predicate="dwithin", distance=0.9 * delta)
+        for j in near[near > i].tolist():
+            if shapely.intersection(shape, shapes[j]).area == 0.0:
+                a, b = np.rint(shapely.get_coordinates(shapely.shortest_line(shape, shapes[j])))
+                out.append([int(v) for v in (*a, *b)])
+    return out
