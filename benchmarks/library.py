@@ -54,7 +54,7 @@ def tables() -> None:
     """By family, and the ranking."""
     library = Library(FOLDER)
     heading("The library of problems")
-    head("family", "problems", "goals", "with a verified tour", "proven",
+    head("family", "problems", "goals", "with a verified tour", "proven", "certified",
          "gap of the others, mean %", "worst %", "seconds, median", "worst",
          name="library")  # fmt: skip
     families: dict[str, list[str]] = {}
@@ -66,7 +66,8 @@ def tables() -> None:
         gaps = [100.0 * (r.gap if r.gap is not None else 1.0) for r in records if not r.proven]
         times = [r.seconds for r in records]
         row(family, len(names), f"{min(goals)} to {max(goals)}", sum(r.verified for r in records),
-            sum(r.proven for r in records), f"{statistics.fmean(gaps):.2f}" if gaps else "",
+            sum(r.proven for r in records), sum(r.certified == "optimal" for r in records),
+            f"{statistics.fmean(gaps):.2f}" if gaps else "",
             f"{max(gaps):.2f}" if gaps else "", f"{statistics.median(times):.2f}",
             f"{max(times):.1f}")  # fmt: skip
     print()

@@ -1,11 +1,13 @@
 """The library of problems: records, contributions, and the ranking of solvers."""
 
+import hashlib
 import json
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from netsp import Problem, Solution, solve, verify
 from netsp.base.errors import InputError, VerificationError
 from netsp.command.main import main
 from netsp.model.bound_scope import LowerBound, Scope
+from netsp.proof.certify import certify
 from netsp.study.library import Library, Record, rank
 from netsp.study.library.rank import Row, append_row, ranking, read_rows
 
@@ -296,3 +299,111 @@ def test_what_answers_late_does_not_count(small, tour):
     )
     assert not row.verified
     assert row.message.startswith("late: answered after")
+
+
+@pytest.fixture(scope="module")
+def proof(tour):
+    certificate = certify(Problem.load(FOLDER / f"{SMALL}.json"), tour)
+    assert certificate.level == "optimal"
+    return certificate.proof
+
+
+def published(folder, tour, proof):
+    library = Library(folder)
+    library.submit(tour, by="me", proof=proof)
+    library.save()
+    return Library(folder)
+
+
+def test_a_bound_is_taken_with_its_proof_which_is_published_beside_the_record(small, tour, proof):
+    library = published(small, tour, proof)
+    record = library.records[SMALL]
+    assert record.certified == "optimal"
+    assert record.lower_bound == record.proof.bound <= record.length
+    assert (small / "proofs" / f"{SMALL}.proof").read_bytes() == proof
+    assert library.check_published(SMALL).bound == record.proof.bound
+    assert library.check_published("maze-5-0") is None
+
+
+def test_a_proof_of_another_problem_or_of_a_lie_changes_nothing(small, tour, proof):
+    library = Library(small)
+    other = solve(library.problem("maze-5-0"))
+    with pytest.raises(VerificationError, match="the proof is refused"):
+        library.submit(other, by="me", proof=proof)
+    lie = json.loads(zlib.decompress(proof))
+    lie["target"] += 2 ** lie["grid"]
+    with pytest.raises(VerificationError, match="the proof is refused"):
+        library.submit(tour, by="me", proof=zlib.compress(json.dumps(lie).encode()))
+    assert not library.records
+    assert not (small / "proofs").exists()
+
+
+def test_a_proof_about_grown_obstacles_is_no_proof_about_the_problem(small):
+    problem = Problem.load(small / f"{SMALL}.json")
+    grown = solve(problem, margin=0.01)
+    certificate = certify(problem, grown)
+    assert certificate.level == "optimal"
+    with pytest.raises(VerificationError, match=r"margin is 0\.01; expected 0"):
+        Library(small).checked_proof(SMALL, certificate.proof)
+
+
+def test_a_record_that_states_more_than_its_proof_is_found(small, tour, proof):
+    library = published(small, tour, proof)
+    record = library.records[SMALL]
+    stated = record.proof.model_copy(update={"bound": 1.000001 * record.proof.bound})
+    library.records[SMALL] = record.model_copy(update={"proof": stated})
+    with pytest.raises(VerificationError, match="the proof shows the bound"):
+        library.check_published(SMALL)
+    library.records[SMALL] = record.model_copy(update={"length": 0.99 * record.length})
+    with pytest.raises(VerificationError, match="is above the record's length"):
+        library.check_published(SMALL)
+    library.records[SMALL] = record.model_copy(update={"proof": None})
+    with pytest.raises(VerificationError, match="the record names no proof"):
+        library.check_published(SMALL)
+
+
+def test_a_better_tour_keeps_the_proof_and_a_damaged_proof_is_replaced(small, tour, proof):
+    library = Library(small)
+    library.submit(solve(library.problem(SMALL), "greedy-2016"), by="you", proof=proof)
+    assert library.records[SMALL].certified == "bound"
+    library.submit(tour, by="me")
+    assert library.records[SMALL].certified == "optimal"
+    library.proof_path(SMALL).write_bytes(proof[:-9])
+    with pytest.raises(VerificationError, match="another sha256"):
+        library.check_published(SMALL)
+    assert library.publish(SMALL, proof)
+    assert library.check_published(SMALL)
+
+
+def test_the_command_checks_a_proof_publishes_it_and_lists_what_is_certified(
+    small, tour, proof, tmp_path, capsys
+):
+    tour.save(tmp_path / "tour.sol")
+    (tmp_path / "tour.proof").write_bytes(proof)
+    words = ["library", "check", str(tmp_path / "tour.sol"), "--folder", str(small)]
+    assert main(words) == 0
+    assert "its bound is not taken: --proof FILE takes one" in capsys.readouterr().out
+    assert main([*words, "--proof", str(tmp_path / "tour.proof"), "--keep"]) == 0
+    assert "the proof holds: no tour is shorter than 52.4705" in capsys.readouterr().out
+    assert main(["library", "list", "--folder", str(small), "--only", SMALL]) == 0
+    assert capsys.readouterr().out.split("\n")[2].split()[4:6] == ["proven", "optimal"]
+    assert main(["library", "proofs", "--folder", str(small)]) == 0
+    assert "published proofs that hold: 1 of 1" in capsys.readouterr().out
+    (small / "proofs" / f"{SMALL}.proof").unlink()
+    assert main(["library", "proofs", "--folder", str(small)]) == 5
+    assert "is missing" in capsys.readouterr().out
+    assert main(["library", "list", "--folder", str(small), "--proof", "x"]) == 2
+    assert capsys.readouterr().err.startswith("netsp: --proof: expected")
+
+
+def test_published_proofs_match_their_records_and_small_ones_hold():
+    library = Library(FOLDER)
+    stated = {n: r.proof for n, r in library.records.items() if r.proof is not None}
+    for name, proof in stated.items():
+        data = library.proof_path(name).read_bytes()
+        assert hashlib.sha256(data).hexdigest() == proof.sha256
+        assert proof.bound <= library.records[name].lower_bound
+    assert {p.stem for p in (FOLDER / "proofs").glob("*.proof")} == set(stated)
+    small = sorted(stated, key=lambda n: library.proof_path(n).stat().st_size)[:5]
+    for name in small:
+        assert library.check_published(name).bound == stated[name].bound

@@ -811,8 +811,9 @@ LIBRARY = Command(
     "list the library of problems, check tours, rank solvers",
     "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl",
     Option(
-        "{list,check,rank}",
-        "list the problems with their best known tours; check solutions against them; rank solvers",
+        "{list,check,proofs,rank}",
+        "list the problems with their best known tours; check solutions against them; check the "
+        "published proofs; rank solvers",
         dest="action",
     ),
     Option("[FILE...]", "check: solution files (JSON)", dest="files"),
@@ -822,9 +823,12 @@ LIBRARY = Command(
         default="problems/library",
     ),
     Option(
-        "--only PATTERN", "list, rank: only problems whose names match; default all", default="*"
+        "--only PATTERN",
+        "list, proofs, rank: only problems whose names match; default all",
+        default="*",
     ),
-    Option("--keep", "check: write better tours to the records"),
+    Option("--keep", "check: write better tours, and the bound of --proof, to the records"),
+    Input("--proof FILE", "check: the proof of a bound, of `netsp solve --proof`"),
     Option("--by NAME", "check: name of the finder, for the records", default="a contributor"),
     OneOf(
         (

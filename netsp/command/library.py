@@ -8,14 +8,16 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from netsp.base.errors import EXIT_NOT_VERIFIED, InputError, counted
+from netsp.base.errors import EXIT_NOT_VERIFIED, InputError, VerificationError, counted
+from netsp.base.files import read_bytes
 from netsp.command import json_output, messages
 from netsp.command.patience import span
 from netsp.command.types import check_writable
-from netsp.model.bound_scope import Scope
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, Scope
 
 if TYPE_CHECKING:
-    from netsp.study.library import Library
+    from netsp.model.solution import Solution
+    from netsp.study.library import Library, Record
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,8 +26,13 @@ def run(args: argparse.Namespace) -> int:
 
     if args.files and args.action != "check":
         raise InputError(f"FILE: expected none with {args.action}, got {args.files[0]!r}")
+    if args.proof and (args.action != "check" or len(args.files) != 1):
+        raise InputError(
+            f"--proof: expected `check` and one FILE, got `{args.action}` and {len(args.files)}"
+        )
     library = Library(args.folder)
-    return {"list": _list, "check": _check, "rank": _rank}[args.action](args, library)
+    actions = {"list": _list, "check": _check, "proofs": _proofs, "rank": _rank}
+    return actions[args.action](args, library)
 
 
 def _chosen(args: argparse.Namespace, library: Library) -> list[str]:
@@ -48,6 +55,8 @@ def _list(args: argparse.Namespace, library: Library) -> int:
                             "lower_bound": r.lower_bound,
                             "gap": r.gap,
                             "lower_bound_of": None if r.bound is None else r.bound.scope.value,
+                            "certified": r.certified,
+                            "certified_bound": None if r.proof is None else r.proof.bound,
                             "solver": r.solver,
                             "by": r.by,
                             "date": r.date,
@@ -61,19 +70,51 @@ def _list(args: argparse.Namespace, library: Library) -> int:
         )
         return 0
     print(f"bounds are on {Scope.ALL_TOURS.tours}")
-    print(f"{'problem':<20} {'goals':>6} {'best':>12} {'bound':>12} {'gap':>9}  found by")
+    print(
+        f"{'problem':<20} {'goals':>6} {'best':>12} {'bound':>12} {'gap':>9}  certified  found by"
+    )
     for name in names:
         goals = library.problem(name).visits
         r = library.records.get(name)
         if r is None:
-            print(f"{name:<20} {goals:>6} {'-':>12} {'-':>12} {'-':>9}")
+            print(f"{name:<20} {goals:>6} {'-':>12} {'-':>12} {'-':>9}  -")
             continue
         bound, gap = "-", "-"
         if r.bound is not None:
             bound = f"{r.bound.length:.6g}"
             gap = "proven" if r.proven else r.bound.percent(r.length, 3)
-        print(f"{name:<20} {goals:>6} {r.length:>12.6g} {bound:>12} {gap:>9}  {r.solver}, {r.by}")
+        print(
+            f"{name:<20} {goals:>6} {r.length:>12.6g} {bound:>12} {gap:>9}  {r.certified:<9}  "
+            f"{r.solver}, {r.by}"
+        )
     return 0
+
+
+def _proofs(args: argparse.Namespace, library: Library) -> int:
+    """Check the published proofs, and return the exit code."""
+    failed, answers = [], []
+    for name in _chosen(args, library):
+        begin = time.monotonic()
+        try:
+            checked = library.check_published(name)
+        except VerificationError as error:
+            failed.append(name)
+            answers.append({"problem": name, "holds": False, "reason": str(error)})
+            if not args.json:
+                print(error)
+            continue
+        if checked is None:
+            continue
+        answers.append({"problem": name, "holds": True, "certified_bound": checked.bound})
+        if not args.json and not args.quiet:
+            gaps = f"; {counted(checked.closed_gaps, 'gap')} closed" if checked.closed_gaps else ""
+            took = f"{time.monotonic() - begin:.1f} s"
+            print(f"{name}: no tour is shorter than {checked.bound:.9g}: holds{gaps}; {took}")
+    if args.json:
+        json_output.tell({"proofs": answers})
+    else:
+        print(f"published proofs that hold: {len(answers) - len(failed)} of {len(answers)}")
+    return EXIT_NOT_VERIFIED if failed else 0
 
 
 def _check(args: argparse.Namespace, library: Library) -> int:
@@ -81,7 +122,8 @@ def _check(args: argparse.Namespace, library: Library) -> int:
 
     if not args.files:
         raise InputError("FILE: expected solutions to check, got none")
-    failed, answers, has_improved = False, [], False
+    failed, answers, has_changed = False, [], False
+    proof = read_bytes(args.proof) if args.proof else None
     for file in args.files:
         solution = Solution.load(file)
         result = library.compared(solution)
@@ -100,9 +142,15 @@ def _check(args: argparse.Namespace, library: Library) -> int:
                 f"{result.length:.9g}, verified, {100 * max(result.above, 0.0):.4f} % above the "
                 f"best known, {record.length:.9g}{proven}"
             )
-        if args.keep and result.better:
-            library.submit(solution, args.by)
-            has_improved = True
+        certified = None
+        if proof is not None and result.verification:
+            certified = library.checked_proof(result.name, proof).bound
+            text += f"; the proof holds: no tour is shorter than {certified:.9g}"
+        elif result.verification and _states_higher(solution, record):
+            text += "; its bound is not taken: --proof FILE takes one with its proof"
+        if args.keep and result.verification and (result.better or certified is not None):
+            library.submit(solution, args.by, proof=proof)
+            has_changed = True
         answers.append(
             {
                 "file": file,
@@ -111,15 +159,24 @@ def _check(args: argparse.Namespace, library: Library) -> int:
                 "length": result.length,
                 "best_known": None if record is None else record.length,
                 "better": result.better,
+                "certified_bound": certified,
             }
         )
         if not args.json:
             print(f"{file}: {result.name}: {text}")
-    if has_improved:
+    if has_changed:
         library.save()
     if args.json:
         json_output.tell({"checked": answers})
     return EXIT_NOT_VERIFIED if failed else 0
+
+
+def _states_higher(solution: Solution, record: Record | None) -> bool:
+    """Return whether a solution states a higher bound on all tours than its record has."""
+    if solution.bound is None or solution.bound.scope is not Scope.ALL_TOURS:
+        return False
+    known = 0.0 if record is None else record.lower_bound or 0.0
+    return solution.bound.length > known * (1.0 + OPTIMALITY_TOLERANCE)
 
 
 def _rank(args: argparse.Namespace, library: Library) -> int:

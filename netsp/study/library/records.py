@@ -1,8 +1,10 @@
-"""Problems in a folder, and a file with a record for each: its best known tour and bound."""
+"""Problems in a folder, with the best known tour, bound and proof of each."""
 
 from __future__ import annotations
 
+import contextlib
 import datetime
+import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,11 +24,27 @@ from netsp.judge import Verification, verify
 from netsp.model.bound_scope import LowerBound, Scope, gap_of, strongest
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution
+from netsp_check import Checked, Refused, check
 
 RECORDS = "records.json"
 
+PROOFS = "proofs"
+"""Name of the folder of proofs beside the problems."""
+
+CertifiedLevel = Literal["optimal", "bound", "none"]
+"""What the published proof shows: that the tour is the shortest, a lower bound, or nothing."""
+
 SAME_LENGTH_TOLERANCE = 1e-6
 """Tolerance, relative, for two lengths that count as equal."""
+
+
+class PublishedProof(Model):
+    """Proof of a lower bound that is published beside the records, as `proofs/PROBLEM.proof`."""
+
+    bound: Annotated[
+        Total, Field(description="no tour is shorter, as netsp_check finds; in the problem's units")
+    ]
+    sha256: Annotated[str, Field(description="of the proof's file")]
 
 
 class Record(Model):
@@ -38,6 +56,9 @@ class Record(Model):
     lower_bound: Annotated[
         Total | None,
         Field(description="no tour at all is shorter (scope all_tours); null if nothing is known"),
+    ] = None
+    proof: Annotated[
+        PublishedProof | None, Field(description="published proof of a bound; null for none")
     ] = None
     solver: Annotated[Name, Field(description="what found the tour")]
     by: Annotated[Name, Field(description="who ran it")]
@@ -59,6 +80,14 @@ class Record(Model):
     def proven(self) -> bool:
         """True if the tour is proven to be the shortest."""
         return self.bound is not None and self.bound.proves(self.length)
+
+    @property
+    def certified(self) -> CertifiedLevel:
+        """What the published proof shows about the tour; a check of the proof confirms it."""
+        if self.proof is None:
+            return "none"
+        proves = LowerBound(self.proof.bound, Scope.ALL_TOURS).proves(self.length)
+        return "optimal" if proves else "bound"
 
     @property
     def gap(self) -> float | None:
@@ -188,8 +217,97 @@ class Library:
         verification = verify(self.problem(name), solution)
         return Comparison(name, verification, solution.length, self.records.get(name))
 
+    def proof_path(self, name: str) -> Path:
+        """Return the path at which the proof of a problem's record is published."""
+        return self.folder / PROOFS / f"{name}.proof"
+
+    def checked_proof(self, name: str, proof: bytes) -> Checked:
+        """Check that a proof holds for a problem of the library, without margin and slack.
+
+        Raises
+        ------
+        InputError
+            There is no such problem.
+        VerificationError
+            The proof does not hold, or it is about grown obstacles or a shorter tether.
+        """
+        if name not in self.paths:
+            raise InputError(f"problem: there is no {name!r} in {self.folder}")
+        try:
+            checked = check(self.paths[name].read_text(encoding="utf-8"), proof)
+        except Refused as error:
+            raise VerificationError(f"{name}: the proof is refused: {error}") from None
+        for field in ("margin", "slack"):
+            if value := getattr(checked, field):
+                raise VerificationError(
+                    f"{name}: the proof is about fewer tours: {field} is {value:g}; expected 0"
+                )
+        return checked
+
+    def check_published(self, name: str) -> Checked | None:
+        """Check the published proof of a record; return None if the record has none.
+
+        Raises
+        ------
+        VerificationError
+            The proof does not hold, or differs from what the record says about it.
+        """
+        record, path = self.records.get(name), self.proof_path(name)
+        if record is None or record.proof is None:
+            if path.exists():
+                raise VerificationError(f"{name}: {path} is there, but the record names no proof")
+            return None
+        if not path.exists():
+            raise VerificationError(f"{name}: the record names a proof, but {path} is missing")
+        data = path.read_bytes()
+        if hashlib.sha256(data).hexdigest() != record.proof.sha256:
+            raise VerificationError(f"{name}: {path} has another sha256 than the record says")
+        checked = self.checked_proof(name, data)
+        _check_stated(record, checked.bound)
+        return checked
+
+    def publish(self, name: str, proof: bytes) -> bool:
+        """Check a proof, write it beside the records, and raise the bound of the record.
+
+        Nothing changes if the published proof shows more. `save` writes the records.
+
+        Returns
+        -------
+        bool
+            Whether the proof was published.
+
+        Raises
+        ------
+        InputError
+            There is no such problem or record.
+        VerificationError
+            The proof does not hold, or its bound is above the length of the record's tour.
+        """
+        checked = self.checked_proof(name, proof)
+        record = self.records.get(name)
+        if record is None:
+            raise InputError(f"problem: {name!r} has no record; expected one before its proof")
+        if record.proof is not None and checked.bound < record.proof.bound:
+            with contextlib.suppress(VerificationError):  # one that does not hold is replaced
+                self.check_published(name)
+                return False
+        stated = PublishedProof(bound=checked.bound, sha256=hashlib.sha256(proof).hexdigest())
+        low = max(checked.bound, record.lower_bound or 0.0)
+        record = record.model_copy(update={"proof": stated, "lower_bound": low})
+        _check_stated(record, checked.bound)
+        path = self.proof_path(name)
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(proof)
+        self.records[name] = record
+        return True
+
     def submit(
-        self, solution: Solution, by: str, commit: str = "unknown", bound: LowerBound | None = None
+        self,
+        solution: Solution,
+        by: str,
+        commit: str = "unknown",
+        bound: LowerBound | None = None,
+        proof: bytes | None = None,
     ) -> Comparison:
         """Judge a solution, and make it the record if it is better; `save` writes the records.
 
@@ -204,6 +322,8 @@ class Library:
         bound : LowerBound, optional
             Lower bound on all tours by a trusted solver. The bound of the solution itself is
             ignored, because the judge cannot check it.
+        proof : bytes, optional
+            Proof of a bound, which is checked and published.
 
         Returns
         -------
@@ -215,12 +335,14 @@ class Library:
         InputError
             `compared` raises it, or the bound has another scope than all tours.
         VerificationError
-            The judge rejects the tour.
+            The judge rejects the tour, or the proof does not hold.
         """
         found = self.compared(solution)
         if not found.verification or solution.length is None:
             failed = [c.name for c in found.verification.checks if not c.passed]
             raise VerificationError(f"{found.name}: the judge did not pass: {', '.join(failed)}")
+        if proof is not None:
+            self.checked_proof(found.name, proof)
         old = found.record
         if bound is not None and bound.scope is not Scope.ALL_TOURS:
             raise InputError(
@@ -234,6 +356,7 @@ class Library:
                 sha256=solution.problem.sha256,
                 length=solution.length,
                 lower_bound=None if low is None else min(low, solution.length),
+                proof=None if old is None else old.proof,
                 solver=solution.solver,
                 by=by,
                 seconds=round(solution.timings.total_s, 3),
@@ -243,6 +366,8 @@ class Library:
             )
         elif old is not None and low is not None and low > (old.lower_bound or 0.0):
             self.records[found.name] = old.model_copy(update={"lower_bound": min(low, old.length)})
+        if proof is not None:
+            self.publish(found.name, proof)
         return found
 
     take = deprecated_method("take", "submit")
@@ -263,6 +388,27 @@ class Library:
         body = ",\n".join("  " + row for row in rows)
         write_text(
             self.folder / RECORDS, f'{{\n "schema_version": 1,\n "records": [\n{body}\n ]\n}}\n'
+        )
+
+
+def _check_stated(record: Record, bound: float) -> None:
+    """Check the bound of a proof against its record.
+
+    Raises
+    ------
+    VerificationError
+        The record states another bound, or its tour or bound contradicts the proof.
+    """
+    assert record.proof is not None
+    if bound != record.proof.bound:
+        raise VerificationError(
+            f"{record.problem}: the proof shows the bound {bound!r}; the record says "
+            f"{record.proof.bound!r}"
+        )
+    if bound > record.length or bound > (record.lower_bound or 0.0):
+        raise VerificationError(
+            f"{record.problem}: the proof's bound {bound:.9g} is above the record's length "
+            f"{record.length:.9g} or bound"
         )
 
 
