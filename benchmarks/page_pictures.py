@@ -140,6 +140,34 @@ def wharf(target: Path) -> None:
     )  # fmt: skip
 
 
+def proof(target: Path) -> None:
+    """The triangles of the proof for the wharf, beneath its shortest tour."""
+    import numpy as np
+    from matplotlib.figure import Figure
+
+    from netsp import Problem, solve
+    from netsp.proof.certify import certify
+    from netsp.view.pictures import style
+    from netsp.view.pictures.problem_picture import draw_map
+    from netsp_check.proof_check import read_proof
+
+    problem = Problem.load(ROOT / "problems/wharf.json")
+    solution = solve(problem)
+    certificate = certify(problem, solution)
+    assert certificate.proof is not None
+    fields = read_proof(certificate.proof)
+    points = np.reshape(fields["points"], (-1, 2)) * 2.0 ** -fields["grid"] + problem.base[:2]
+    triangles = np.reshape(fields["triangles"], (-1, 3))
+    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
+    ax = figure.subplots()
+    draw_map(problem, solution, ax=ax)
+    ax.triplot(*points.T, triangles, color=style.CANCELLED, linewidth=0.5, zorder=0.5)
+    ax.set(xlim=(-0.6, 18.3), ylim=(-0.6, 9.1))
+    title = f"{problem.name}: the triangles of the proof that no tour is shorter than"
+    ax.set_title(f"{title} {certificate.bound:.2f} {problem.units}", fontsize=10, loc="left")
+    style.save(figure, target)
+
+
 def import_site(target: Path) -> None:
     """The problem made from the map `examples/site.geojson`."""
     run_netsp(
@@ -297,6 +325,7 @@ PICTURES: tuple[Callable[[Path], None], ...] = (
     app_import,
     app_space,
     wharf,
+    proof,
     import_site,
     import_tank,
     import_basin,
