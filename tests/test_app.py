@@ -759,7 +759,7 @@ def test_the_page_in_a_browser(tmp_path):
             def answer():
                 return page.inner_text("#answer")
 
-            first = f"{solve(Problem.load(file)).length:.2f} m, proven optimal"
+            first = f"{solve(Problem.load(file)).length:.2f} m, proven shortest by this solver"
             wait(lambda: answer() == first)
             # asked in one go: what is drawn is drawn anew whenever the server says something
             x, y = page.evaluate(
@@ -774,7 +774,7 @@ def test_the_page_in_a_browser(tmp_path):
             edited = json.loads((tmp_path / ".p.json.unsaved").read_text())
             problem = Problem.model_validate(edited)
             assert problem.goals[2] != Problem.load(WHARF).goals[2]
-            assert answer() == f"{solve(problem).length:.2f} m, proven optimal"
+            assert answer() == f"{solve(problem).length:.2f} m, proven shortest by this solver"
             page.locator("#map").focus()
             page.keyboard.press("Control+z")
             wait(lambda: answer() == first)

@@ -204,7 +204,7 @@ def test_what_closes_a_bound_is_the_shortest_of_its_scope_only(scope, small, sol
     wide = scope in (Scope.ALL_TOURS, Scope.GIVEN_ORDER, Scope.TRAVEL_GRAPH)
     assert (found.status is Status.OPTIMAL) == wide
     for text in (found.proof, summary(small, found), _title(small, found)):
-        assert ("proven optimal" in text) == wide
+        assert ("proven shortest by this solver" in text) == wide
     assert above_shortest(None, found.bound) == above_shortest(3.0, None) == "no bound"
 
 
@@ -413,7 +413,7 @@ def test_no_place_claims_more_of_a_tour_over_few_classes(restricted):
     assert found.status is Status.OPTIMAL_OF_KEPT
     for place in (repr(found), summary(problem, found), _title(problem, found), found.proof,
                   _summary(problem, found, NOT_FLOWN), str(verify(problem, found))):  # fmt: skip
-        assert "proven optimal" not in place
+        assert "proven shortest by this solver" not in place
         assert all(v <= shortest * (1 + 1e-5) for v in claimed(place))
         assert all(found.length <= shortest * (1.0 + v / 100.0) * 1.01 for v in above(place))
 
@@ -473,7 +473,7 @@ def test_words_of_a_proof_for_each_status():
     assert proof(Status.FEASIBLE, 10.0, bound) == "at most 25 % above the shortest tour"
     kept = proof(Status.OPTIMAL_OF_KEPT, 10.0, bound)
     assert kept == f"{Status.OPTIMAL_OF_KEPT.verdict}; at most 25 % above the shortest tour"
-    assert proof(Status.OPTIMAL, 8.0, bound) == "proven optimal"
+    assert proof(Status.OPTIMAL, 8.0, bound) == "proven shortest by this solver"
     in_order = LowerBound(8.0, Scope.GIVEN_ORDER)
-    assert proof(Status.OPTIMAL, 8.0, in_order) == "proven optimal, in the given order"
+    assert proof(Status.OPTIMAL, 8.0, in_order) == "proven shortest by this solver, in the given order"
     assert "blind" in proof(Status.INVALID, 8.0, None)

@@ -108,6 +108,11 @@ FOR_PROBLEMS = (
         "--keep-order",
         "visit the goals in the order of the file; only their homotopy classes are chosen",
     ),
+    Output(
+        "--proof FILE",
+        "prove the tour and write the proof, which `netsp verify --proof` and `python -m "
+        "netsp_check` check without the solver (roadmap taut only)",
+    ),
     Option(
         "--slack S",
         "slack tether that must fit in addition, as a share of the taut length, such as 0.05",
@@ -226,6 +231,16 @@ VERIFY = Command(
         "compare-path reads, or a JSON list of points)",
     ),
     Option("--margins", "also print the margins, as netsp margins does"),
+    Input(
+        "--proof FILE",
+        "proof file that `netsp solve --proof` wrote: check that no tour is shorter; without "
+        "SOLUTION, only check the proof",
+    ),
+    Output(
+        "--problem-output FILE",
+        "write the problem in the long form, which `python -m netsp_check` reads: without short "
+        "forms such as inspect, any_of and bounds that are an outline",
+    ),
     frame("frame of a path to measure: local (the problem's plane) or global (degrees)"),
     Option(
         "--system N",

@@ -34,6 +34,9 @@ def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
         "lower_bound": solution.lower_bound,
         "gap": solution.gap,
         "lower_bound_of": None if solution.bound is None else solution.bound.scope.value,
+        "certified": solution.certified,
+        "certified_reason": solution.certified_reason,
+        "certified_bound": solution.certified_bound,
         "order": [problem.goal_name(v.goal) for v in solution.tour],
         "longest_tether": max((v.tether_length for v in solution.tour), default=None),
         "tether_length": problem.tether_length,
@@ -89,6 +92,7 @@ def of_verdict(verdict: Verification) -> dict[str, Any]:
     return {
         "verified": verdict.passed,
         "checks": [
-            {"name": c.name, "passed": c.passed, "detail": c.detail} for c in verdict.checks
+            {"name": c.name, "passed": c.passed if c.was_made else None, "detail": c.detail}
+            for c in verdict.checks
         ],
     }

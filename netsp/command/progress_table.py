@@ -41,6 +41,7 @@ class ProgressTable:
         self._held: tuple[float, Progress] | None = None
         self._begin = time.monotonic()
         self._slow = ""
+        self._subject: tuple[str, str] | None = None
         self._patience = threading.Timer(policy.silence_s, self._explain)
         self._patience.daemon = True
 
@@ -73,6 +74,17 @@ class ProgressTable:
             self._show(now - self._begin, row)
         else:
             self._held = now - self._begin, row
+
+    def tell(self, stage: str, text: str) -> None:
+        """Print a line about work that has no tour and bound of its own, such as a proof.
+
+        A line that begins like the last one is held back until a row is due.
+        """
+        self.end()
+        now, subject = time.monotonic(), (stage, text.partition(" ")[0])
+        if subject != self._subject or now - self._shown >= self._policy.row_interval_s:
+            self._print(f"{now - self._begin:>6.1f}s  {stage:<10} {text}")
+            self._subject, self._shown = subject, now
 
     def __enter__(self) -> ProgressTable:
         return self
@@ -114,8 +126,9 @@ def summary(
     picture: str | None = None,
     trace: str | None = None,
     policy: CommandPolicy = CommandPolicy(),
+    proof: str | None = None,
 ) -> str:
-    """Return the result in a few lines."""
+    """Return the result in a few lines; `proof` is the name of the proof file."""
     t = solution.timings
     times = (
         f"roadmap {t.roadmap_s:.2f} s, legs {t.matrix_s:.2f} s, solver {t.solve_s:.2f} s, "
@@ -153,6 +166,8 @@ def summary(
         lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
     if solution.legs_left_out:
         lines.insert(1, _left_out(problem, solution, policy.max_named_legs))
+    if told := proof_line(problem, solution, proof):
+        lines.insert(len(lines) - 1, told)
     if output:
         lines.append(f"solution {output}")
     if picture:
@@ -160,6 +175,30 @@ def summary(
     if trace:
         lines.append(f"trace    {trace}")
     return "\n".join(lines)
+
+
+def proof_line(problem: Problem, solution: Solution, file: str | None) -> str | None:
+    """Return the line that says what a proof file shows, or what a claim rests on without one.
+
+    Parameters
+    ----------
+    file : str or None
+        Name of the proof file that was asked for.
+    """
+    if file is None:
+        if solution.status is not Status.OPTIMAL or solution.kept_order:
+            return None
+        return "proof    none written; --proof FILE writes one that anyone can check"
+    if solution.certified == "none":
+        return None  # a warning has said why
+    shown = solution.certified_lower_bound
+    if solution.certified == "optimal" or shown is None:
+        what = "there is no tour" if solution.length is None else "no tour is shorter"
+        return f"proof    {file}: {what}; anyone can check it (netsp verify --proof {file})"
+    return (
+        f"proof    {file}: no tour is shorter than {shown.length:.6f} {problem.units}; no more is "
+        f"shown, because {solution.certified_reason}"
+    )
 
 
 def _left_out(problem: Problem, solution: Solution, limit: int) -> str:

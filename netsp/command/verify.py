@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import sys
 from typing import TYPE_CHECKING
 
 from netsp.base.errors import EXIT_NOT_VERIFIED, InputError
@@ -13,6 +15,7 @@ from netsp.command.types import load_pair
 if TYPE_CHECKING:
     from netsp.judge import Verification
     from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
 
 
 def run(args: argparse.Namespace) -> int:
@@ -24,8 +27,14 @@ def run(args: argparse.Namespace) -> int:
 
     if is_mission_file(args.problem):
         return _mission(args)
+    if args.problem_output is not None:
+        from netsp.model.problem import Problem
+
+        Problem.load(args.problem).save(args.problem_output)
     if args.measures and args.solution is not None and is_scene(args.problem):
         return _path_in_scene(args)
+    if args.solution is None and (args.proof or args.problem_output):
+        return _proof_alone(args)
     if args.solution is None:
         read_text(args.problem)  # a missing file is reported as usual
         raise InputError(f"SOLUTION: {args.problem} is not a mission; expected a solution, too")
@@ -33,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
         from netsp.model.problem import Problem
 
         if _is_path(args.solution):
+            refuse(args, "--proof", f"is for solutions, and {args.solution} is a path")
             _measure_paths(Problem.load(args.problem), args)
             return 0
     elif _is_path(args.solution):
@@ -43,6 +53,12 @@ def run(args: argparse.Namespace) -> int:
     from netsp.judge import verify
 
     verdict = verify(problem, solution)
+    if args.proof:
+        verdict = _with_proof(args, verdict, problem, solution)
+    else:
+        from netsp.judge.proof_judgement import with_claim
+
+        verdict = with_claim(verdict, solution)
     _print_verdict(args, verdict)
     if args.measures and solution.path and not args.quiet:
         if solution.problem.sha256 != problem.sha256:
@@ -65,6 +81,36 @@ def _print_verdict(args: argparse.Namespace, verdict: Verification) -> None:
     elif not args.quiet:
         print(verdict)
         print("verified" if verdict else "NOT VERIFIED")
+
+
+def _with_proof(
+    args: argparse.Namespace, verdict: Verification, problem: Problem, solution: Solution | None
+) -> Verification:
+    """Return a verdict with the check of the proof file."""
+    from netsp.base.files import read_bytes
+    from netsp.command.interrupts import until_interrupted
+    from netsp.command.patience import Patience
+    from netsp.judge.proof_judgement import with_proof
+
+    data = read_bytes(args.proof)
+    waiting = Patience(sys.stderr, "checking the proof", args.policy)
+    with contextlib.nullcontext() if args.quiet else waiting:
+        return until_interrupted(
+            "checking the proof", lambda: with_proof(verdict, problem, solution, data)
+        )
+
+
+def _proof_alone(args: argparse.Namespace) -> int:
+    """Check a proof without a tour; without a proof, only the problem was wanted."""
+    from netsp.judge import Verification
+    from netsp.model.problem import Problem
+
+    if args.proof is None:
+        return 0
+    problem = Problem.load(args.problem)
+    verdict = _with_proof(args, Verification(()), problem, None)
+    _print_verdict(args, verdict)
+    return 0 if verdict else EXIT_NOT_VERIFIED
 
 
 def _path_in_scene(args: argparse.Namespace) -> int:
@@ -92,7 +138,8 @@ def _path_in_scene(args: argparse.Namespace) -> int:
 def _mission(args: argparse.Namespace) -> int:
     """Judge a planned mission."""
     refuse(args, "SOLUTION", f"{args.problem} is a mission; expected nothing beside it")
-    refuse(args, "--measures --margins", f"is for problems, and {args.problem} is a mission")
+    names = "--measures --margins --proof --problem-output"
+    refuse(args, names, f"is for problems, and {args.problem} is a mission")
     from netsp.command.interrupts import until_interrupted
     from netsp.plan.space.judge import verify_mission
     from netsp.world.mission.mission import Mission

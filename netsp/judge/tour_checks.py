@@ -24,7 +24,7 @@ from netsp.judge.overstretch import first_overstretch
 from netsp.judge.passage import passes
 from netsp.judge.solid_distances import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
-from netsp.model.bound_scope import Scope
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, Scope
 from netsp.model.problem import Circle, Problem
 from netsp.model.solution import Solution, Status, solution_scope, tension_ratio
 
@@ -59,11 +59,20 @@ class Check:
         Whether it holds.
     detail : str
         Measured values, or the reason for the failure.
+    was_made : bool
+        False if the condition, which the solution states, was not checked; it then counts as
+        passed.
     """
 
     name: str
     passed: bool
     detail: str
+    was_made: bool = True
+
+    @property
+    def mark(self) -> str:
+        """Mark for lists of checks: "ok", "FAIL", or "?" if it was not made."""
+        return "FAIL" if not self.passed else "ok" if self.was_made else "?"
 
 
 @dataclass(frozen=True)
@@ -96,9 +105,7 @@ class Verification:
 
     def __str__(self) -> str:
         width = max(len(c.name) for c in self.checks)
-        return "\n".join(
-            f"{'ok  ' if c.passed else 'FAIL'}  {c.name:<{width}}  {c.detail}" for c in self.checks
-        )
+        return "\n".join(f"{c.mark:<4}  {c.name:<{width}}  {c.detail}" for c in self.checks)
 
 
 def verify(
@@ -627,6 +634,8 @@ class _Judge:
         if (s.lower_bound is None) != (gap is None):
             return "bound without gap or gap without bound"
         if s.bound is None:
+            if s.certified != "none":
+                return f"certified: {s.certified}, but there is no bound"
             return f"{status.value}, but there is no bound" if status.is_optimal else None
         bound, scope = s.bound.length, s.bound.scope
         if scope in NOT_OF_PROBLEMS:
@@ -638,9 +647,28 @@ class _Judge:
         provable = solution_scope(s.roadmap, s.classes, kept_order=s.kept_order)
         if not provable.includes(scope) or scope.keeps_order != s.kept_order:
             return f"a bound on {scope.tours}, but a run like this can bound {provable.tours}"
+        if fault := self._fault_of_certificate(length):
+            return fault
         closed = gap <= CLOSED_GAP_TOLERANCE
         if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
             return f"{status.value}, but the gap is {s.bound.percent(length, 6)}"
         if status.is_optimal and closed and status is not Status.optimal_of(scope):
             return f"{status.value}, but the bound is one on {scope.tours}"
+        return None
+
+    def _fault_of_certificate(self, length: float) -> str | None:
+        """Return how the stated certificate contradicts the other fields, or None."""
+        s, shown = self.solution, self.solution.certified_lower_bound
+        says = f"certified: {s.certified}"
+        if (s.certified == "none") != (shown is None):
+            return f"{says}, {'yet with' if shown else 'but without'} certified_bound"
+        if shown is None:
+            return None
+        if shown.length > length * (1.0 + OPTIMALITY_TOLERANCE):
+            return f"certified_bound {shown.length:g} above length {length:g}"
+        if s.certified == "optimal" and not (s.status.is_optimal and shown.proves(length)):
+            return (
+                f"{says}, but the status is {s.status.value}, and certified_bound is "
+                f"{shown.percent(length, 4)} below the length"
+            )
         return None

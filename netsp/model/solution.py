@@ -96,7 +96,7 @@ _OPTIMAL_OF = {
 }
 
 _VERDICTS = {
-    Status.OPTIMAL: "proven optimal",
+    Status.OPTIMAL: "proven shortest by this solver",
     Status.OPTIMAL_OF_KEPT: "shortest over the classes kept, which are not all",
     Status.OPTIMAL_OF_ROADMAP: "shortest along this roadmap, not of all tours",
     Status.OPTIMAL_OF_STATES: "shortest between the states found, not of all tours",
@@ -153,7 +153,8 @@ def tension_ratio(friction: float, turning: float) -> float:
 def proof(status: Status, length: float | None, bound: LowerBound | None) -> str:
     """Return in words what is proven about a tour, and for which scope.
 
-    Results are, for example, "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
+    Results are, for example, "proven shortest by this solver", "at most 3.8 % above the shortest
+    tour", "no bound". They rest on the solver; `Solution.proof` also names certified bounds.
     """
     if status is Status.INVALID:
         return "no tour for a tether: the solver is blind to it"
@@ -165,6 +166,12 @@ def proof(status: Status, length: float | None, bound: LowerBound | None) -> str
     in_order = bound is not None and bound.scope.keeps_order
     return f"{status.verdict}, in the given order" if in_order else status.verdict
 
+
+CertifiedLevel = Literal["optimal", "bound", "none"]
+"""What a proof file shows of a tour: that it is the shortest, a lower bound, or nothing."""
+
+NO_PROOF = "no proof was written"
+"""Reason why a tour is not certified, in files that state none."""
 
 EXACT_ROADMAPS = frozenset({"taut"})
 """Names of the roadmaps whose travel graph, with all classes, contains every admissible tour."""
@@ -262,6 +269,14 @@ class Solution(Drawn, FileModel):
         from roadmap and classes.
     gap : float or None
         (length - lower_bound) / length.
+    certified : {"optimal", "bound", "none"}
+        What the proof file that was written with this solution shows: that no tour is shorter, that
+        none is shorter than `certified_bound`, or nothing. Only the proof shows that it is true:
+        check it with `netsp verify --proof`.
+    certified_reason : str
+        Why `certified` is not "optimal"; empty if it is.
+    certified_bound : float or None
+        Length that no tour falls below, by the proof file.
     classes : {"all", "non-looping", "shortest"} or None
         Homotopy classes that the roadmap kept; "shortest" means those with the shortest tethers of
         each goal.
@@ -277,7 +292,7 @@ class Solution(Drawn, FileModel):
     >>> solution.status.value, round(solution.length, 2), [visit.goal for visit in solution.tour]
     ('optimal', 29.58, [1, 3, 4, 2, 0])
     >>> solution.proof
-    'proven optimal'
+    'proven shortest by this solver'
     """
 
     picture: ClassVar[str] = "netsp.view.pictures.problem_picture:draw_solution"
@@ -345,6 +360,23 @@ class Solution(Drawn, FileModel):
         Total | None,
         Field(description="(length - lower_bound) / length; null if either is missing"),
     ]
+    certified: Annotated[
+        CertifiedLevel,
+        Field(
+            description="what the proof file written with this solution shows: optimal (no tour is "
+            "shorter), bound (none is shorter than certified_bound) or none"
+        ),
+    ] = "none"
+    certified_reason: Annotated[
+        str, Field(max_length=1000, description='why `certified` is not "optimal"; empty if it is')
+    ] = NO_PROOF
+    certified_bound: Annotated[
+        Total | None,
+        Field(
+            description="length that no tour falls below by the proof file, in the problem's "
+            "units; null without one"
+        ),
+    ] = None
     entangled: Annotated[
         tuple[int, ...],
         Field(
@@ -397,16 +429,32 @@ class Solution(Drawn, FileModel):
             out["status"] = Status.optimal_of(scope)
         return out
 
+    @model_validator(mode="before")
+    @classmethod
+    def _empty_reason(cls, data: Any) -> Any:
+        """Add the empty reason of a certified tour, which files leave out."""
+        if isinstance(data, Mapping) and data.get("certified") == "optimal":
+            return {"certified_reason": "", **data}
+        return data
+
     def __repr__(self) -> str:
         """Return one line with problem, solver, status, length, bound and number of visits."""
         length = "" if self.length is None else f", length {self.length:.6g}"
         bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         return (
             f"<Solution of {self.problem.name!r} by {self.solver}: "
-            f"{self.status.value}{length}{bound}, {len(self.tour)} visits>"
+            f"{self.status.value}{length}{bound}{self._certified_words}, {len(self.tour)} visits>"
         )
 
     __str__ = __repr__
+
+    @property
+    def _certified_words(self) -> str:
+        if self.certified == "optimal":
+            return ", certified"
+        if self.certified == "bound" and self.certified_bound is not None:
+            return f", certified bound {self.certified_bound:.6g}"
+        return ""
 
     def to_frame(self) -> pandas.DataFrame:
         """Return a pandas DataFrame with a row for each visit, in the order of the tour.
@@ -445,8 +493,64 @@ class Solution(Drawn, FileModel):
 
     @property
     def proof(self) -> str:
-        """Phrase that says what is proven about the tour."""
-        return proof(self.status, self.length, self.bound)
+        """Phrase that says what is proven about the tour, and whether by the solver alone or by a
+        proof file."""
+        text = proof(self.status, self.length, self.bound)
+        if self.status is Status.INVALID or self.certified == "none":
+            return text
+        if self.certified == "optimal":
+            return "certified shortest" if self.length is not None else "certified: no tour exists"
+        certified = above_shortest(self.length, self.certified_lower_bound)
+        return f"certified: {text}" if text == certified else f"{text}; certified: {certified}"
+
+    @property
+    def certified_lower_bound(self) -> LowerBound | None:
+        """Bound of the proof file on all tours; None without one."""
+        if self.certified_bound is None:
+            return None
+        return LowerBound(self.certified_bound, Scope.ALL_TOURS)
+
+    def with_certificate(
+        self, level: CertifiedLevel, bound: float | None = None, reason: str = ""
+    ) -> Solution:
+        """Return the solution with what a proof shows.
+
+        The lower bound is raised to that of the proof if it was lower, or held for fewer tours than
+        it could; gap and status follow.
+
+        Parameters
+        ----------
+        level : {"optimal", "bound", "none"}
+            What the proof shows; its tolerance is `OPTIMALITY_TOLERANCE`.
+        bound : float, optional
+            Length that no tour falls below, by the proof; infinite if there is no tour.
+        reason : str
+            Why the level is not "optimal".
+
+        Examples
+        --------
+        >>> from netsp import Problem, solve
+        >>> problem = Problem.load("problems/pool.json")
+        >>> greedy = solve(problem, "lns", iteration_limit=1, seed=1)
+        >>> greedy.with_certificate("bound", 20.0, "time is up").certified_bound
+        20.0
+        """
+        finite = None if bound is None or math.isinf(bound) else bound
+        known: dict[str, Any] = {"certified": level, "certified_bound": finite}
+        known["certified_reason"] = "" if level == "optimal" else reason or NO_PROOF
+        if level == "none" or finite is None or self.length is None:
+            return self.model_copy(update=known)
+        scope = solution_scope(self.roadmap, self.classes, kept_order=self.kept_order)
+        proven = LowerBound(finite, Scope.ALL_TOURS).for_part(scope, "a proof is of all tours")
+        old = self.bound
+        is_wider = old is not None and old.scope is not scope and level == "optimal"
+        is_higher = old is not None and old.scope is scope and old.length < finite
+        if old is None or is_wider or is_higher:
+            gap = proven.gap(self.length)
+            known |= {"lower_bound": finite, "lower_bound_of": scope, "gap": gap}
+            if proven.proves(self.length):
+                known["status"] = Status.optimal_of(scope)
+        return self.model_copy(update=known)
 
     def to_json(self) -> str:
         """Return the solution as JSON of format version 1."""
@@ -461,6 +565,12 @@ class Solution(Drawn, FileModel):
             del data["lower_bound_of"]
         if not self.margin:
             del data["margin"]
+        if self.certified_bound is None:
+            del data["certified_bound"]
+        if self.certified == "none" and self.certified_reason == NO_PROOF:
+            del data["certified"], data["certified_reason"]
+        elif not self.certified_reason:
+            del data["certified_reason"]
         for name, plain in (("kept_order", False), ("slack", 0.0), ("friction", 0.0)):
             if data[name] == plain:
                 del data[name]

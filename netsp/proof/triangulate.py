@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from netsp_check.problem_file import Obstacle, Problem
 from netsp_check.triangulation import RESOLUTION
 
 if TYPE_CHECKING:
-    import shapely
+    pass
 
 GRID_BITS = 36
 """Format constant: the size of a problem is between 2^35 and 2^36 grid units."""

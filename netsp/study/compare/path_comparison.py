@@ -100,7 +100,7 @@ class PathComparison:
     >>> problem = Problem.load("problems/pool.json")
     >>> comparison = compare_paths(problem, [])
     >>> comparison.proof, round(comparison.tour_length, 2)
-    ('proven optimal', 29.58)
+    ('proven shortest by this solver', 29.58)
     """
 
     problem: Problem = field(repr=False)
@@ -115,6 +115,8 @@ class PathComparison:
         """Phrase that says what is proven about the length of the tour."""
         if self.tour is None:
             return self.tour_note
+        if self.tour.certified != "none":
+            return self.tour.proof
         status = self.tour.status
         above = above_shortest(self.tour.length, self.tour.bound)
         if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT:

@@ -75,7 +75,7 @@ def checks(verdict: Verification) -> str:
         Verdict on a solution or a mission.
     """
     rows = "".join(
-        f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
+        f'<tr><td class="{"ok" if c.passed else "bad"}">{c.mark}</td>'
         f'<td style="text-align:left">{html.escape(c.name)}</td>'
         f'<td style="text-align:left">{html.escape(c.detail)}</td></tr>'
         for c in verdict.checks

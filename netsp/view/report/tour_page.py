@@ -16,6 +16,7 @@ from netsp.base.arrays import Bools, Floats
 from netsp.base.errors import counted
 from netsp.hsignature.signature_measures import measure
 from netsp.judge import verify
+from netsp.judge.proof_judgement import with_claim
 from netsp.model.problem import Problem
 from netsp.model.solution import Solution, Status
 from netsp.online.execute.tether_limits import describe_limits, limit_periods, overruns
@@ -74,7 +75,10 @@ def page(what: Opened) -> str:
     if found is not None:
         parts += ["<h2>Margins</h2>", briefing.margin_list(problem, found)]
     if run is None or is_same_problem:
-        parts += ["<h2>Checks</h2>", briefing.checks(verify(problem, solution))]
+        parts += [
+            "<h2>Checks</h2>",
+            briefing.checks(with_claim(verify(problem, solution), solution)),
+        ]
     if problem.state is None and is_same_problem:
         parts += [
             "<h2>Measures of entanglement</h2>",

@@ -1,0 +1,124 @@
+"""Proofs in `netsp solve --proof`: from a solution to the proof file and what it shows."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.command import messages
+
+if TYPE_CHECKING:
+    from netsp.base.clock import Clock
+    from netsp.model.problem import Problem
+    from netsp.model.solution import Solution
+    from netsp.proof.certify import Certificate
+
+
+def check_provable(args: argparse.Namespace, problem: Problem) -> None:
+    """Raise InputError if `--proof` is given where no proof is possible."""
+    from netsp.base.files import STANDARD
+    from netsp.model.solution import EXACT_ROADMAPS
+
+    if args.proof is None:
+        return
+    if args.proof == STANDARD:
+        raise InputError("--proof: expected the name of a file, got - (standard output)")
+    if args.roadmap not in EXACT_ROADMAPS:
+        raise InputError(
+            f"--proof: proofs are of all tours, and --roadmap {args.roadmap} knows only some; "
+            "expected --roadmap taut"
+        )
+    if problem.state is not None:
+        raise InputError(
+            "--proof: the problem starts from a state, and proofs are of tours that start at the "
+            "base; expected a problem without state"
+        )
+
+
+def with_proof(
+    file: str, problem: Problem, solution: Solution, clock: Clock, tell: Callable[[str], None]
+) -> Solution:
+    """Write a proof for a solution, and return the solution with what the proof shows.
+
+    Without a proof, a warning says why, and no file is written. Ctrl-C and the end of the time end
+    the search for a proof, not the command.
+
+    Parameters
+    ----------
+    file : str
+        Name of the proof file.
+    clock : Clock
+        Clock of the command.
+    tell : callable
+        Called with a line of progress.
+    """
+    from netsp.base.files import write_bytes
+    from netsp.base.interrupt_signals import deferred_interrupts
+
+    certificate = _certificate(problem, solution, clock, tell)
+    reason = certificate.reason
+    if certificate.proof is not None:
+        try:
+            with deferred_interrupts():
+                write_bytes(file, certificate.proof)
+            return solution.with_certificate(certificate.level, certificate.bound, reason)
+        except InputError as error:
+            reason = str(error)
+        except KeyboardInterrupt:  # came while the file was written, which is there now
+            return solution.with_certificate(certificate.level, certificate.bound, reason)
+    old = "; the file of that name is an older one" if os.path.exists(file) else ""
+    messages.warning(f"no proof: {reason}; {file} was not written{old}")
+    return solution.with_certificate("none", reason=reason)
+
+
+def _certificate(
+    problem: Problem, solution: Solution, clock: Clock, tell: Callable[[str], None]
+) -> Certificate:
+    """Return the certificate of a solution, or one of level "none" if time was up."""
+    from netsp.base.interrupt_signals import until_interrupt
+    from netsp.proof.certify import Certificate, certify
+
+    stopped = "interrupted"
+    if clock.is_up:
+        reason = stopped if clock.is_stopped else "no time was left after the solve"
+        return Certificate("none", reason)
+    try:
+        with until_interrupt(clock) as rest:
+            try:
+                found = rest.bounded(
+                    "proving",
+                    lambda: certify(problem, solution, time_limit=rest, on_progress=tell),
+                    winds_down=True,
+                )
+            except LimitReachedError:
+                found = Certificate("none", "time limit reached")
+            except MemoryError:
+                found = Certificate("none", "out of memory")
+            is_stopped = rest.is_stopped
+    except KeyboardInterrupt:
+        return Certificate("none", stopped)
+    if is_stopped and found.level == "none":
+        return Certificate("none", stopped)
+    return found
+
+
+def infeasible_solution(problem: Problem, args: argparse.Namespace) -> Solution:
+    """Return a solution that says that there is no tour, for a proof of it."""
+    from netsp.model.solution import ProblemReference, Solution, Status
+    from netsp.plan.answer import versions
+
+    return Solution(
+        problem=ProblemReference(name=problem.name, sha256=problem.sha256),
+        solver=args.solver,
+        roadmap=args.roadmap,
+        margin=args.margin,
+        slack=args.slack,
+        status=Status.INFEASIBLE,
+        length=None,
+        lower_bound=None,
+        gap=None,
+        versions=versions(),
+    )
