@@ -4,7 +4,7 @@ The package needs the standard library only, and nothing of netsp. Run it as
 `python -m netsp_check PROBLEM TOUR PROOF`.
 """
 
-from netsp_check.proof_check import Checked, check
 from netsp_check.problem_file import Refused
+from netsp_check.proof_check import Checked, check
 
 __all__ = ["Checked", "Refused", "check"]

@@ -1,7 +1,7 @@
-"""The bound: integer duals, cuts and a branching tree (Lemmas 9 to 14).
+"""The bound: integer duals, cuts and a branching tree (Lemmas 9 to 15).
 
-All numbers are whole grid units. A stage gives each leg a reduced cost and strikes out the legs and
-vertices that no tour shorter than the target uses; what is left goes to the next stage.
+All numbers are whole grid units. A stage gives each leg a reduced cost, and strikes out the legs
+and vertices that no tour shorter than the target uses; the rest goes to the next stage.
 """
 
 from __future__ import annotations
@@ -9,36 +9,29 @@ from __future__ import annotations
 import bisect
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from itertools import combinations
+from typing import Any, NamedTuple
 
 from netsp_check.covering_tree import CoveringTree
 from netsp_check.leg_bounds import LegBounds
 from netsp_check.problem_file import Refused
 
 Pair = tuple[int, int]
+"""Two clusters or two vertices, the smaller number first."""
 
 UNLIMITED = 1 << 100
-"""Sentinel: more than any reduced cost."""
+"""Sentinel: more than any cost."""
 
 SLACK = 64
-"""Tolerance: grid units that cover the rounding of the distances in `Bound._near_legs`."""
+"""Tolerance: grid units that cover the rounding of distances in `Bound._near_legs`."""
 
 
-@dataclass
-class Cut:
-    """Cut, as sets of vertices (Lemmas 9 to 11).
+class Cut(NamedTuple):
+    """Inequality over legs (Lemmas 9 to 11): Σ coefficients >= constant.
 
-    Attributes
-    ----------
-    inner, outer
-        Masks of vertices: for a subtour cut S without C, and S; else both are the handle.
-    pairs
-        Pairs of clusters of the teeth.
-    crossing
-        Whether only legs across the handle count in teeth.
-    constant
-        Right-hand side.
+    `inner` and `outer` are masks of vertices: of a subtour cut, S without C, and S; else both are
+    the handle. `pairs` are the pairs of clusters within teeth; if `crossing`, only legs across the
+    handle count there.
     """
 
     inner: int
@@ -57,31 +50,23 @@ def read_cut(data: Any, cluster: Sequence[int]) -> Cut:
     if kind == "subtour":
         if inside & 1:
             raise Refused("subtour cut: expected a set without the base")
-        own = sum(1 << v for v, c in enumerate(cluster) if c == more)
-        return Cut(inside & ~own, inside)
+        return Cut(inside & ~sum(1 << v for v, c in enumerate(cluster) if c == more), inside)
+    teeth, known = [frozenset(t) for t in more], set(cluster)
+    pairs = frozenset((g, h) for t in teeth for g, h in combinations(sorted(t), 2))
+    if len(teeth) % 2 == 0 or not all(t <= known for t in teeth):
+        raise Refused(f"{kind}: expected an odd number of teeth, sets of clusters")
     if kind == "parity":
-        pairs = frozenset((min(g, h), max(g, h)) for g, h in more)
-        if len(pairs) != len(more) or len(pairs) % 2 == 0 or any(g == h for g, h in pairs):
-            raise Refused("parity cut: expected an odd number of distinct pairs")
+        if not len(pairs) == len(teeth) == sum(len(t) == 2 for t in teeth):
+            raise Refused("parity cut: expected distinct pairs")
         return Cut(inside, inside, pairs, True, 1 - len(pairs))
-    if kind == "comb":
-        return _read_comb(inside, [frozenset(t) for t in more], cluster)
-    raise Refused(f"cut: unknown kind {kind!r}")
-
-
-def _read_comb(inside: int, teeth: list[frozenset[int]], cluster: Sequence[int]) -> Cut:
     handle = {c for v, c in enumerate(cluster) if inside >> v & 1}
-    if any(c in handle and not inside >> v & 1 for v, c in enumerate(cluster)):
+    if kind != "comb" or any(c in handle and not inside >> v & 1 for v, c in enumerate(cluster)):
         raise Refused("comb: expected a handle of whole clusters")
-    if len(teeth) % 2 == 0 or len(teeth) < 3:
-        raise Refused("comb: expected an odd number of teeth, at least three")
-    if sum(len(t) for t in teeth) != len(frozenset().union(*teeth)):
-        raise Refused("comb: expected disjoint teeth")
+    if len(teeth) < 3 or sum(map(len, teeth)) != len(frozenset().union(*teeth)):
+        raise Refused("comb: expected three or more disjoint teeth")
     if not all(t & handle and t - handle for t in teeth):
         raise Refused("comb: expected teeth that are partly in the handle")
-    pairs = frozenset((g, h) for t in teeth for g in t for h in t if g < h)
-    constant = len(teeth) + 1 - 2 * sum(len(t) - 1 for t in teeth)
-    return Cut(inside, inside, pairs, False, constant)
+    return Cut(inside, inside, pairs, False, len(teeth) + 1 - 2 * sum(len(t) - 1 for t in teeth))
 
 
 class Stage:
@@ -103,14 +88,12 @@ class Stage:
         prices, self.reach = data["a"], data.get("reach", UNLIMITED)
         used = [(cuts[k], b) for k, b in data["cuts"]]
         self._multipliers = [b for _, b in used]
-        if not all(isinstance(b, int) and b >= 0 for b in self._multipliers):
-            raise Refused("stage: expected multipliers of cuts of at least 0")
-        self._pair_prices = {(min(g, h), max(g, h)): price for g, h, price in data.get("p", ())}
-        whole = [*prices, self.reach, *self._pair_prices.values()]
-        if len(prices) != max(cluster) + 1 or not all(isinstance(a, int) for a in whole):
-            raise Refused("stage: expected a whole number for each cluster")
-        if not self._pair_prices.keys() <= adjacent:
-            raise Refused("stage: has the price of a pair that need not be adjacent")
+        self._pair_prices = {(g, h): price for g, h, price in data.get("p", ())}
+        numbers = [*prices, self.reach, *self._multipliers, *self._pair_prices.values()]
+        if len(prices) != max(cluster) + 1 or any(type(n) is not int for n in numbers):
+            raise Refused("stage: expected whole numbers, one for each cluster and cut")
+        if min(self._multipliers, default=0) < 0 or not self._pair_prices.keys() <= adjacent:
+            raise Refused("stage: expected multipliers of at least 0, and prices of adjacent pairs")
         self.constant = 2 * sum(prices) + sum(self._pair_prices.values())
         self.constant += sum(b * cut.constant for cut, b in used)
         self.potential = [prices[c] for c in cluster]
@@ -126,8 +109,8 @@ class Stage:
                 self._teeth.setdefault(pair, [0, 0])[cut.crossing] |= 1 << k
 
     def reduced(self, u: int, v: int, cost: int, pair: Pair) -> int:
-        """Return the reduced cost of a leg, or if that is at least `reach`, a number from there
-        to the reduced cost."""
+        """Return the reduced cost of a leg, or if that is at least `reach`, some number that is at
+        least `reach` and at most the reduced cost."""
         out = cost - self.potential[u] - self.potential[v] - self._pair_prices.get(pair, 0)
         if out >= self.reach:
             return out
@@ -145,6 +128,8 @@ class Bound:
 
     Attributes
     ----------
+    target
+        In grid units; None to check that there is no tour at all.
     leaves
         Number of leaves of the branching tree that were closed.
     """
@@ -152,41 +137,43 @@ class Bound:
     def __init__(self, tree: CoveringTree, legs: LegBounds, target: int | None) -> None:
         self.tree, self.legs, self.leaves = tree, legs, 0
         self.target = UNLIMITED if target is None else target
+        problem = tree.triangulation.problem
+        self.cluster = [problem.cluster[v.place] for v in tree.vertices]
+        self.clusters = max(problem.cluster) + 1
+        self._before, self._allowed = problem.before, _allowed(problem.before, self.clusters)
         self._cuts: list[Cut] = []
-        of_place = tree.triangulation.problem.cluster
-        self.cluster = [of_place[v.place] for v in tree.vertices]
-        self.clusters = max(of_place) + 1
-        self._nodes = [v.node for v in tree.vertices]
 
     def check(self, node: dict[str, Any], cuts: list[Any]) -> None:
         """Check a branching tree over a table of cuts; refuse it if a leaf is not closed."""
         self._cuts = [read_cut(cut, self.cluster) for cut in cuts]
         alive = self.reachable()
-        if self.clusters == 2 and len(alive) > 1:
-            raise Refused("there may be a shorter tour to the goal and back")
+        if self.clusters < 3 and self._is_possible(alive):
+            raise Refused("there may be a shorter tour, to one goal and back")
         self._check_node(node, alive, None, set())
 
     def reachable(self) -> set[int]:
         """Return the vertices within the tether that are on tours shorter than the target."""
-        tether = math.floor(self.tree.triangulation.problem.tether)
-        longest = min(2 * tether, self.target - 1)
-        others = range(1, len(self.cluster))
-        return {0, *(v for v in others if 2 * self.legs.bound(0, v, 2) <= longest)}
+        longest = min(2 * math.floor(self.tree.triangulation.problem.tether), self.target - 1)
+        near = {0}
+        for v in range(1, len(self.cluster)):
+            # the greater effort raises bounds by a few percent
+            effort = 1 if 2.1 * self.legs.bound(0, v, 1) <= longest else 2
+            if 2 * self.legs.bound(0, v, effort) <= longest:
+                near.add(v)
+        return near
 
     def _check_node(
         self, node: dict[str, Any], alive: set[int], legs: set[Pair] | None, adjacent: set[Pair]
     ) -> None:
         for data in node.get("stages", ()):
-            if not self._is_possible(alive):
-                break
-            stage = Stage(data, self._cuts, self.cluster, adjacent)
-            alive, legs = self._strike_out(stage, alive, legs)
-        if not self._is_possible(alive):
+            if self._is_possible(alive):
+                stage = Stage(data, self._cuts, self.cluster, adjacent)
+                alive, legs = self._strike_out(stage, alive, legs)
+        if not self._is_possible(alive) or _is_out_of_order(adjacent, self._before):
             self.leaves += 1
-            return
-        if legs is None:
-            raise Refused("node: branches before a stage")
-        if "pair" in node:
+        elif legs is None:
+            raise Refused("node: expected a stage before it branches")
+        elif "pair" in node:
             g, h = sorted(node["pair"])
             apart = {leg for leg in legs if self._pair(*leg) != (g, h)}
             self._check_node(node["apart"], alive, apart, adjacent)
@@ -213,26 +200,27 @@ class Bound:
         self, stage: Stage, alive: set[int], legs: set[Pair] | None
     ) -> tuple[set[int], set[Pair]]:
         """Return the vertices and legs that a tour shorter than the target may use (Lemma 13)."""
-        if legs is not None:
-            stage.reach = UNLIMITED
+        absent = stage.reach if legs is None else UNLIMITED
+        stage.reach = absent
         price = {}
         for u, v in self._near_legs(stage, alive) if legs is None else legs:
             r = self._price(stage, u, v)
-            if r < stage.reach:
+            if r < absent:
                 price[u, v] = r
-        lowest = {v: [stage.reach, stage.reach] for v in alive}
-        for (u, v), r in price.items():
-            for w in (u, v):
-                if r < lowest[w][1]:
-                    lowest[w] = sorted((lowest[w][0], r))
-        cheapest = [stage.reach * 2] * self.clusters
+        lowest = dict.fromkeys(alive, (absent, absent))
+        for leg, r in price.items():
+            for w in leg:
+                a, b = lowest[w]
+                if r < b:
+                    lowest[w] = (min(a, r), max(a, r))
+        cheapest = [2 * UNLIMITED] * self.clusters
         for v, (a, b) in lowest.items():
             cheapest[self.cluster[v]] = min(cheapest[self.cluster[v]], a + b)
-        # twice the bound, less twice the target
+        # twice what a tour costs above the target, at least
         excess = 2 * (stage.constant - self.target) + sum(cheapest)
         above = {v: -cheapest[self.cluster[v]] for v in alive}
         left = {v for v in alive if excess + above[v] + sum(lowest[v]) < 0}
-        if left and excess + 2 * (stage.reach + min(lowest[v][0] + above[v] for v in left)) < 0:
+        if left and excess + 2 * (absent + min(lowest[v][0] + above[v] for v in left)) < 0:
             raise Refused("stage: its reach is too small")
         kept = set()
         for (u, v), r in price.items():
@@ -257,24 +245,78 @@ class Bound:
         A path between two vertices crosses the edges at which their branches part (Lemma 6).
         """
         nodes, end, vertices = self.tree.nodes, self.tree.end, self.tree.vertices
-        own = [v.reach - p for v, p in zip(vertices, stage.potential, strict=True)]
+        at_node = [v.node for v in vertices]
+        own = [math.floor(v.reach) - p for v, p in zip(vertices, stage.potential, strict=True)]
         for u in sorted(alive):
-            child, node, beyond = -1, vertices[u].node, 0.0
+            child, node, beyond = -1, vertices[u].node, 0
             while node >= 0:
-                # first the vertices in the node itself, then those behind its other edges
-                branches = [] if child >= 0 else [(node, node + 1, math.inf)]
+                # the node's own vertices, then those behind its other edges
+                branches = [(node, node + 1, UNLIMITED)] if child < 0 else []
                 d = node + 1 if child < 0 else end[child]
                 while d < end[node]:
-                    branches.append((d, end[d], nodes[d].farthest))
+                    branches.append((d, end[d], math.ceil(nodes[d].farthest)))
                     d = end[d]
                 for first, last, farthest in branches:
                     limit = stage.reach + stage.potential[u] - beyond + farthest + SLACK
-                    low = max(bisect.bisect_left(self._nodes, first), u + 1)
-                    for v in range(low, bisect.bisect_left(self._nodes, last)):
-                        if own[v] < limit and v in alive and self.cluster[v] != self.cluster[u]:
+                    low = max(bisect.bisect_left(at_node, first), u + 1)
+                    for v in range(low, bisect.bisect_left(at_node, last)):
+                        if own[v] < limit and v in alive and self._pair(u, v) in self._allowed:
                             yield u, v
                 child, node = node, nodes[node].parent
-                beyond = vertices[u].reach - nodes[child].farthest
+                beyond = math.floor(vertices[u].reach - nodes[child].farthest)
+
+
+def _allowed(before: frozenset[Pair], clusters: int) -> set[Pair]:
+    """Return the pairs of clusters that precedences allow to be adjacent (Lemma 15)."""
+    apart = {(a, d) for a, b in before for c, d in before if b == c}
+    apart |= {(d, a) for a, d in apart}
+    inner = {a for a, _ in before} & {b for _, b in before}
+    apart |= {(0, c) for c in inner}
+    return {pair for pair in combinations(range(clusters), 2) if pair not in apart}
+
+
+def _is_out_of_order(adjacent: set[Pair], before: frozenset[Pair]) -> bool:
+    """Return whether adjacent pairs form a path that precedences exclude (Lemma 15)."""
+    near: dict[int, list[int]] = {}
+    for g, h in adjacent:
+        near.setdefault(g, []).append(h)
+        near.setdefault(h, []).append(g)
+    left = set(near)
+    for start in sorted(near, key=lambda c: (c > 0, len(near[c]))):  # the base, then ends of paths
+        rank = {start: 0}
+        for sign, last in zip((1, -1), near[start], strict=False):
+            c, previous, count = last, start, 0
+            while c in left and c not in rank:
+                # from the base: 1, 2, … from the front, -1, -2, … from the back
+                count += 1
+                rank[c] = sign * count
+                onward = [d for d in near[c] if d != previous]
+                c, previous = (onward[0] if onward else start), c
+        if start in left and len(rank) > 1:
+            left -= rank.keys()
+            if all(_conflicts(rank, before, start == 0, sense) for sense in (1, -1)):
+                return True
+    return False
+
+
+def _conflicts(rank: dict[int, int], before: frozenset[Pair], has_base: bool, sense: int) -> bool:
+    """Return whether a path, run in one sense, has a pair of clusters in the wrong order."""
+    for a, b in before:
+        if has_base:
+            # visits at the front, then those elsewhere, then those at the back
+            p, q = (_place(sense * rank.get(c, 0)) for c in (a, b))
+        elif a in rank and b in rank:
+            p, q = (float(sense * rank[c]) for c in (a, b))
+        else:
+            continue
+        if p > q:
+            return True
+    return False
+
+
+def _place(rank: int) -> float:
+    """Return a number that orders visits: 1, 2, … come first, -2, -1 last, 0 in between."""
+    return -1.0 / rank if rank else 0.0
 
 
 def bits(mask: int) -> Iterator[int]:

@@ -3,142 +3,172 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 Exact = tuple[Fraction, Fraction]
 """Point of the plane in grid units from the base."""
 
+GRID_BITS = 36
+"""Format constant: the size of a problem is between 2^35 and 2^36 grid units."""
+
+MAX_NUMBER = 1e15
+"""Format limit: numbers of a problem file are smaller."""
+
+FIELDS = {
+    "problem": "schema_version name base goals obstacles tether_length clearance bounds units"
+    " origin state site",
+    "goal": "name position choice after any_of",
+    "obstacle": "name center radius polygon",
+}
+"""Fields that are understood; a proof for a problem with another field is refused."""
+
 
 class Refused(Exception):
-    """A file that is not understood, or a proof that does not hold; the message says why."""
+    """A file is not understood, or a proof does not hold; the message says why."""
 
 
-@dataclass(frozen=True)
-class Obstacle:
+class Obstacle(NamedTuple):
     """Obstacle: a circle if it has one corner, else a simple polygon; grown by `growth`."""
 
     corners: tuple[Exact, ...]
     growth: Fraction
 
     def span(self) -> tuple[Exact, Exact]:
-        """Return the lower left and the upper right corner of a box around the grown obstacle."""
-        xs, ys = [x for x, _ in self.corners], [y for _, y in self.corners]
-        low, high = (min(xs), min(ys)), (max(xs), max(ys))
-        g = self.growth
-        return (low[0] - g, low[1] - g), (high[0] + g, high[1] + g)
+        """Return the lower left and the upper right corner of a box around it."""
+        xs, ys, g = [x for x, _ in self.corners], [y for _, y in self.corners], self.growth
+        return (min(xs) - g, min(ys) - g), (max(xs) + g, max(ys) + g)
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """Problem in grid units from the base; the numbers of the file are taken exactly.
 
-    Attributes
-    ----------
-    grid : int
-        A grid unit is 2^-grid units of the problem.
-    places : tuple of (x, y)
-        Plan positions of the base, then of the goals.
-    heights : tuple of Fraction
-        Height of each place above the base.
-    cluster : tuple of int
-        Number of what each place serves: 0 is the base, and goals of one choice share a number.
-    tether : Fraction
-        Maximum length of the taut tether.
-    bounds : (x0, y0, x1, y1) or None
-        Box that robot and tether stay in.
-    size : Fraction
-        Largest difference of coordinates between the base and a goal.
-    left_out : tuple of str
-        Rules of the problem that the proof leaves out; a bound without them is a bound with them.
+    `places` and `heights` are those of the base, then of the goals; `cluster` numbers what each
+    place serves: 0 is the base, and goals of one choice share a number. `before` holds the pairs of
+    clusters of which the first is visited before the second. A grid unit is 2^-grid units of the
+    file.
     """
 
     grid: int
+    size: Fraction
     places: tuple[Exact, ...]
     heights: tuple[Fraction, ...]
     cluster: tuple[int, ...]
+    before: frozenset[tuple[int, int]]
     obstacles: tuple[Obstacle, ...]
     tether: Fraction
     bounds: tuple[Fraction, ...] | None
-    size: Fraction
-    left_out: tuple[str, ...]
 
 
-FIELDS = frozenset(
-    "schema_version name base goals obstacles tether_length clearance bounds units origin site"
-    " state".split()
-)
+def read_json(text: str | bytes) -> dict[str, Any]:
+    """Return a JSON object; refuse other values, repeated keys, NaN and infinite numbers."""
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        if len(dict(pairs)) < len(pairs):
+            raise Refused("a key occurs twice in one object")
+        return dict(pairs)
+
+    def refuse(name: str) -> None:
+        raise Refused(f"expected finite numbers, got {name}")
+
+    data = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+    if not isinstance(data, dict):
+        raise Refused("expected a JSON object")
+    return data
 
 
-def read_problem(text: str, grid: int, margin: float = 0.0, slack: float = 0.0) -> Problem:
-    """Return the problem of a JSON text, with obstacles grown by a margin and the tether reduced
-    by slack.
-
-    Raises
-    ------
-    Refused
-        The text is no problem in the long form of format version 1.
-    """
-    data = json.loads(text)
-    if unknown := set(data) - FIELDS:
-        raise Refused(f"problem: unknown field {min(unknown)!r}")
+def read_problem(text: str, margin: float = 0.0, slack: float = 0.0) -> Problem:
+    """Return the problem of a file in its long form, with obstacles grown by a margin, and with a
+    share of the tether's length kept in reserve as slack."""
+    data = read_json(text)
+    _check_fields(data, "problem")
     if data.get("state") is not None:
-        raise Refused("problem: starts from a state; expected one that starts at the base")
-    scale = Fraction(2) ** grid
-    base = [Fraction(v) for v in [*data["base"], 0.0][:3]]
-    plain = [g if isinstance(g, dict) else {"position": g} for g in data["goals"]]
-    goals = [place for k, goal in enumerate(plain) for place in _places_of(goal, k)]
-    at = [[Fraction(v) for v in [*g["position"], 0.0][:3]] for g in goals]
+        raise Refused("state: expected a tour that starts at the base")
+    goals = [place for k, goal in enumerate(data["goals"]) for place in _places(goal, k)]
+    base, *at = (_point(p) for p in (data["base"], *(g["position"] for g in goals)))
+    tether = _number(data["tether_length"]) / (1.0 + slack)
+    size = max((abs(p[i] - base[i]) for p in at for i in (0, 1)), default=Fraction(0))
+    size = min(size or Fraction(tether), Fraction(tether))
+    grid = GRID_BITS - math.frexp(size)[1]
+    unit = Fraction(2) ** -grid
 
-    def exact(x: float, y: float) -> Exact:
-        return (Fraction(x) - base[0]) * scale, (Fraction(y) - base[1]) * scale
+    def exact(point: Any) -> Exact:
+        x, y, _ = _point(point)
+        return (x - base[0]) / unit, (y - base[1]) / unit
 
-    clearance = Fraction(float(data.get("clearance") or 0.0) + margin)
+    clearance = Fraction(_number(data.get("clearance", 0.0)) + margin)
     obstacles = []
     for o in data.get("obstacles", ()):
-        if "polygon" in o:
-            obstacles.append(
-                Obstacle(tuple(exact(x, y) for x, y in o["polygon"]), clearance * scale)
-            )
-        else:
-            radius = Fraction(o["radius"]) + clearance
-            obstacles.append(Obstacle((exact(*o["center"]),), radius * scale))
+        _check_fields(o, "obstacle")
+        growth = clearance + (0 if "polygon" in o else Fraction(_number(o["radius"])))
+        corners = tuple(exact(p) for p in (o["polygon"] if "polygon" in o else [o["center"]]))
+        obstacles.append(Obstacle(corners, growth / unit))
     box = data.get("bounds")
-    if box is not None and not all(isinstance(v, int | float) for v in box):
-        raise Refused("bounds: are an outline; expected [xmin, ymin, xmax, ymax]")
-    places = (exact(*data["base"][:2]), *(exact(float(p[0]), float(p[1])) for p in at))
+    clusters = _clusters(goals)
     return Problem(
         grid=grid,
-        places=places,
-        heights=(Fraction(0), *((p[2] - base[2]) * scale for p in at)),
-        cluster=(0, *_clusters(goals)),
+        size=size / unit,
+        places=tuple(((p[0] - base[0]) / unit, (p[1] - base[1]) / unit) for p in (base, *at)),
+        heights=tuple((p[2] - base[2]) / unit for p in (base, *at)),
+        cluster=(0, *clusters),
+        before=_precedences(goals, clusters),
         obstacles=tuple(obstacles),
-        tether=Fraction(data["tether_length"] / (1.0 + slack)) * scale,
-        bounds=None if box is None else (*exact(*box[:2]), *exact(*box[2:])),
-        size=max(abs(v) for place in places for v in place),
-        left_out=("precedences",) if any(g.get("after") for g in plain) else (),
+        tether=Fraction(tether) / unit,
+        bounds=None if box is None else (*exact(box[:2]), *exact(box[2:])),
     )
 
 
-def _places_of(goal: dict[str, Any], k: int) -> list[dict[str, Any]]:
-    """Return the places of a goal of the file, one of which suffices."""
-    if "any_of" in goal:
-        choice = object() if goal.get("name") is None else goal["name"]
-        places = [p if isinstance(p, dict) else {"position": p} for p in goal["any_of"]]
-        return [{"position": p["position"], "choice": choice} for p in places]
-    if "position" not in goal:
-        raise Refused(f"goals[{k}]: is in a short form; expected a position")
-    return [goal]
+def _check_fields(data: dict[str, Any], kind: str) -> None:
+    if unknown := data.keys() - set(FIELDS[kind].split()):
+        raise Refused(f"{kind}: field {min(unknown)!r} is unknown, or a short form")
 
 
-def _clusters(goals: list[dict[str, Any]]) -> list[int]:
+def _number(value: Any) -> float:
+    if type(value) not in (int, float) or not abs(value) < MAX_NUMBER:
+        raise Refused(f"expected a number below {MAX_NUMBER:g}, got {value!r}")
+    return float(value)
+
+
+def _point(value: Any) -> tuple[Fraction, Fraction, Fraction]:
+    """Return the point (x, y, z) of a list of two or three numbers."""
+    if not isinstance(value, list) or len(value) not in (2, 3):
+        raise Refused(f"expected [x, y] or [x, y, z], got {value!r}")
+    x, y, z = (Fraction(_number(v)) for v in (*value, 0.0)[:3])
+    return x, y, z
+
+
+def _places(goal: Any, k: int) -> list[dict[str, Any]]:
+    """Return the goals, with one position each, that a goal of the file stands for."""
+    if not isinstance(goal, dict):
+        return [{"position": goal}]
+    _check_fields(goal, "goal")
+    if "any_of" not in goal:
+        return [goal]
+    choice = goal.get("name") or f"choice {k}"
+    places = [place for p in goal["any_of"] for place in _places(p, k)]
+    return [{**place, "choice": choice, "after": goal.get("after", [])} for place in places]
+
+
+def _clusters(goals: Sequence[dict[str, Any]]) -> list[int]:
     """Return the cluster of each goal, from 1 in order of first appearance."""
     known: dict[Any, int] = {}
-    for k, goal in enumerate(goals):
-        choice = goal.get("choice")
-        known.setdefault(k if choice is None else ("choice", choice), len(known) + 1)
-    return [
-        known[k if g.get("choice") is None else ("choice", g["choice"])]
-        for k, g in enumerate(goals)
-    ]
+    keys = [k if g.get("choice") is None else str(g["choice"]) for k, g in enumerate(goals)]
+    return [known.setdefault(key, len(known) + 1) for key in keys]
+
+
+def _precedences(
+    goals: Sequence[dict[str, Any]], clusters: Sequence[int]
+) -> frozenset[tuple[int, int]]:
+    """Return the pairs of clusters that `after` orders, transitively closed."""
+    out = {
+        (clusters[j], clusters[k])
+        for k, goal in enumerate(goals)
+        for name in goal.get("after", ())
+        for j, other in enumerate(goals)
+        if name in (other.get("name"), other.get("choice"))
+    }
+    for h in clusters:
+        out |= {(g, i) for g, a in out if a == h for b, i in out if b == h}
+    return frozenset(out)

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 from netsp_check.problem_file import Exact, Obstacle, Problem, Refused
 
 Point = tuple[int, int]
 """Point of the grid."""
 
+Disk = tuple[float, float, float]
+"""Centre (x, y) and radius."""
+
 RESOLUTION = 2**30
-"""Tolerance: the size of the problem divided by this is δ, the width below which a gap may count
-as closed, and the depth to which a goal may lie in an obstacle."""
+"""Tolerance: δ is the size of the problem divided by this. Gaps between obstacles up to 3 δ wide
+may count as closed, and a place may lie in an obstacle by less than δ."""
 
 MAX_HALVINGS = 8
 """Format limit: how often an edge is halved until one piece of an obstacle holds each part."""
 
+MAX_COORDINATE = 2**44
+"""Format limit: coordinates in grid units are smaller, so that rounding errors stay below 1."""
 
-@dataclass(frozen=True)
-class Piece:
+MIN_RADIUS = 2**12
+"""Tolerance: arcs of smaller disks, in grid units, count as their chords."""
+
+
+class Piece(NamedTuple):
     """Convex part of an obstacle: the points within `radius` of the segment from a to b."""
 
     a: Exact
@@ -29,16 +37,63 @@ class Piece:
 
     def holds(self, p: Exact) -> bool:
         """Return whether a point is in the piece."""
-        return distance2(p, self.a, self.b) <= self.radius * self.radius
+        return _distance2(p, self.a, self.b) <= self.radius * self.radius
 
-    def frame(self) -> tuple[float, ...]:
-        """Return a box (x0, y0, x1, y1) that holds the piece, despite rounding."""
-        reach = float(self.radius) * (1.0 + 1e-6) + 1.0
-        xs, ys = (
-            sorted((float(self.a[0]), float(self.b[0]))),
-            sorted((float(self.a[1]), float(self.b[1]))),
+
+class Border:
+    """Region in which edges without a neighbour must lie: obstacles, bridges, outside the box."""
+
+    def __init__(
+        self, problem: Problem, box: list[int] | None, bridges: Sequence[tuple[Point, Point]]
+    ) -> None:
+        self.delta = problem.size / RESOLUTION
+        usable = _usable(problem, box, self.delta)
+        self._box = box if box is not None else problem.bounds
+        self._polygons = [o.corners for o in usable if len(o.corners) > 1]
+        grown = [o for o in usable if o.growth > 0]
+        pieces = [Piece(c, c, o.growth) for o in grown for c in o.corners]
+        pieces += [Piece(a, b, o.growth) for o in grown for a, b in _edges(o.corners)]
+        self._framed = [(piece, _frame(piece)) for piece in pieces]
+        new = [self._bridge(a, b, problem, box is None) for a, b in bridges]
+        self._framed += [(piece, _frame(piece)) for piece in new]
+
+    def holder(self, a: Exact, b: Exact, halvings: int = 0) -> Piece | None:
+        """Return a piece that holds an edge, None if it is held otherwise; refuse other edges."""
+        x0, x1 = sorted((float(a[0]), float(b[0])))
+        y0, y1 = sorted((float(a[1]), float(b[1])))
+        for piece, (u0, v0, u1, v1) in self._framed:
+            is_near = u0 <= x0 and x1 <= u1 and v0 <= y0 and y1 <= v1
+            if is_near and piece.holds(a) and piece.holds(b):
+                return piece
+        if self._is_outside(a, b) or any(_is_inside(c, a, b) for c in self._polygons):
+            return None
+        if halvings == MAX_HALVINGS:
+            raise Refused(f"an edge near ({x0:.0f}, {y0:.0f}) is not in an obstacle")
+        middle = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
+        self.holder(a, middle, halvings + 1)
+        self.holder(middle, b, halvings + 1)
+        return None
+
+    def _bridge(self, a: Point, b: Point, problem: Problem, has_bounds: bool) -> Piece:
+        """Return the piece that closes a gap of at most δ between points in obstacles (Lemma 4)."""
+        first, last = exact(a), exact(b)
+        if _distance2(first, last, last) > self.delta**2:
+            raise Refused(f"bridge {a}, {b}: expected a length of at most δ")
+        for p in (first, last):
+            is_held = any(q.holds(p) for q, _ in self._framed)
+            is_held = is_held or any(_is_inside(c, p, p) for c in self._polygons)
+            if not is_held and not (has_bounds and self._is_outside(p, p)):
+                raise Refused(f"bridge {a}, {b}: expected both ends in obstacles")
+        if any(_distance2(p, first, last) < (2 * self.delta) ** 2 for p in problem.places):
+            raise Refused(f"bridge {a}, {b}: expected 2 δ to the base and all goals")
+        return Piece(first, last, self.delta)
+
+    def _is_outside(self, a: Exact, b: Exact) -> bool:
+        """Return whether an edge is outside the box, or on its border."""
+        box = self._box
+        return box is not None and any(
+            max(a[i], b[i]) <= box[i] or min(a[i], b[i]) >= box[i + 2] for i in (0, 1)
         )
-        return xs[0] - reach, ys[0] - reach, xs[1] + reach, ys[1] + reach
 
 
 class Triangulation:
@@ -46,14 +101,12 @@ class Triangulation:
 
     Attributes
     ----------
-    points : list of (x, y)
-        Corners, on the grid.
-    triangles : list of (a, b, c)
-        Indices of corners, counter-clockwise.
+    points, triangles : list
+        Corners on the grid, and triples of their indices, counter-clockwise.
     left : dict
         Triangle on the left of each directed edge (a, b).
     disks : dict
-        Disk (x, y, radius) that holds both ends of a directed edge (a, b) on the border.
+        Disk that holds both ends of a directed edge (a, b) without a triangle on its right.
     """
 
     def __init__(
@@ -62,32 +115,31 @@ class Triangulation:
         points: list[Point],
         triangles: list[tuple[int, int, int]],
         box: list[int] | None,
-        bridges: list[tuple[Point, Point]],
+        bridges: Sequence[tuple[Point, Point]],
     ) -> None:
         self.problem, self.points, self.triangles = problem, points, triangles
+        if any(abs(v) >= MAX_COORDINATE for p in (*points, *problem.places) for v in p):
+            raise Refused("points: are too far from the base")
         self.left: dict[tuple[int, int], int] = {}
         for t, (a, b, c) in enumerate(triangles):
             if turn(points[a], points[b], points[c]) <= 0:
                 raise Refused(f"triangle {t}: expected corners in counter-clockwise order")
             for edge in ((a, b), (b, c), (c, a)):
                 if self.left.setdefault(edge, t) != t:
-                    raise Refused(f"triangle {t}: two triangles are on the left of edge {edge}")
+                    raise Refused(f"triangle {t}: another one is on the left of edge {edge}")
         self._check_fans()
-        self._delta = problem.size / RESOLUTION
-        self._border = Border(problem, self._usable(box), box)
-        for a, b in bridges:
-            self._border.add_bridge(a, b, self._delta)
-        self.disks: dict[tuple[int, int], tuple[float, float, float]] = {}
-        self._check_border()
+        self.disks: dict[tuple[int, int], Disk] = {}
+        self._check_border(Border(problem, box, bridges))
 
-    def locate(self, k: int) -> tuple[int, Point]:
-        """Return a triangle that holds place k, and the grid point nearest to the place."""
-        at = (round(self.problem.places[k][0]), round(self.problem.places[k][1]))
-        for t, corners in enumerate(self.triangles):
-            a, b, c = (self.points[i] for i in corners)
+    def locate(self, k: int) -> tuple[list[int], Point]:
+        """Return all triangles that hold place k, and the grid point nearest to the place."""
+        at = round(self.problem.places[k][0]), round(self.problem.places[k][1])
+        found = []
+        for t, (i, j, l) in enumerate(self.triangles):
+            a, b, c = self.points[i], self.points[j], self.points[l]
             if turn(a, b, at) >= 0 and turn(b, c, at) >= 0 and turn(c, a, at) >= 0:
-                return t, at
-        raise Refused(f"place {k}: no triangle holds it")
+                found.append(t)
+        return found, at
 
     def _check_fans(self) -> None:
         """Check that the triangles about a corner never surround it (Lemma 2)."""
@@ -101,94 +153,23 @@ class Triangulation:
         if closed:
             raise Refused(f"point {min(closed)[0]}: triangles surround it")
 
-    def _usable(self, box: list[int] | None) -> list[Obstacle]:
-        """Return the obstacles that may bound triangles: all, or those within the box (Lemma 3)."""
-        problem, bounds = self.problem, self.problem.bounds
-        if box is None:
-            if bounds is None:
-                raise Refused("box: missing; expected one, because the problem has no bounds")
-            return list(problem.obstacles)
-        low, high = [Fraction(v) for v in box[:2]], [Fraction(v) for v in box[2:]]
-        if bounds is not None and not _encloses(bounds[:2], bounds[2:], low, high):
-            raise Refused("box: reaches beyond the bounds")
-        if not all(_encloses(low, high, p, p) for p in problem.places):
-            raise Refused("box: does not hold the base and all goals")
-        spans = [(o, *o.span()) for o in problem.obstacles]
-        inner = [v + 1 for v in low], [v - 1 for v in high]  # paths along the box must be free
-        return [o for o, first, last in spans if _encloses(*inner, first, last)]
-
-    def _check_border(self) -> None:
-        """Check that each edge without a neighbour is in obstacles, and away from places there."""
-        buried = [p for p in self.problem.places if self._border.holds_point(p)]
+    def _check_border(self, border: Border) -> None:
+        """Check that edges without a neighbour are in obstacles, δ away from all places."""
+        near = 2.0 * float(border.delta)
+        places = [(p, float(p[0]), float(p[1])) for p in self.problem.places]
         for a, b in self.left:
             if (b, a) in self.left:
                 continue
-            start, end = _exact(self.points[a]), _exact(self.points[b])
-            piece = self._border.holder(start, end)
+            start, end = exact(self.points[a]), exact(self.points[b])
+            piece = border.holder(start, end)
             if piece is not None and piece.a == piece.b:
-                self.disks[a, b] = float(piece.a[0]), float(piece.a[1]), float(piece.radius)
-            for p in buried:
-                if distance2(p, start, end) < self._delta**2:
-                    raise Refused(f"edge {(a, b)}: is less than δ from a place in an obstacle")
-
-
-class Border:
-    """Region in which edges without a neighbour must lie: obstacles, bridges, outside the box."""
-
-    def __init__(self, problem: Problem, usable: list[Obstacle], box: list[int] | None) -> None:
-        self._places, self._has_bounds = problem.places, box is None
-        self._box = [Fraction(v) for v in box] if box is not None else list(problem.bounds or ())
-        self._polygons = [o.corners for o in usable if len(o.corners) > 1]
-        corners = [Piece(c, c, o.growth) for o in usable for c in o.corners if o.growth > 0]
-        edges = [
-            Piece(a, b, o.growth) for o in usable if o.growth > 0 for a, b in _edges(o.corners)
-        ]
-        self._pieces = [(p, p.frame()) for p in corners + edges]
-
-    def add_bridge(self, a: Point, b: Point, delta: Fraction) -> None:
-        """Add what closes a gap of at most δ between two points in obstacles (Lemma 4)."""
-        first, last = _exact(a), _exact(b)
-        if distance2(first, last, last) > delta * delta:
-            raise Refused(f"bridge {a}, {b}: is longer than δ")
-        if not all(self.holds_point(p) or self._is_beyond_bounds(p) for p in (first, last)):
-            raise Refused(f"bridge {a}, {b}: an end is in no obstacle")
-        if any(distance2(p, first, last) < 4 * delta * delta for p in self._places):
-            raise Refused(f"bridge {a}, {b}: is less than 2 δ from the base or a goal")
-        piece = Piece(first, last, delta)
-        self._pieces.append((piece, piece.frame()))
-
-    def holds_point(self, p: Exact) -> bool:
-        """Return whether a point is in a closed obstacle."""
-        x, y = float(p[0]), float(p[1])
-        near = (q for q, f in self._pieces if f[0] <= x <= f[2] and f[1] <= y <= f[3])
-        return any(q.holds(p) for q in near) or any(_inside(c, p, p) for c in self._polygons)
-
-    def _is_beyond_bounds(self, p: Exact) -> bool:
-        """Return whether a point is outside the problem's bounds, and these are the box."""
-        return self._has_bounds and self._is_outside(p, p)
-
-    def holder(self, a: Exact, b: Exact, halvings: int = 0) -> Piece | None:
-        """Return a piece that holds an edge, None if it is held otherwise; refuse other edges."""
-        x0, x1 = sorted((float(a[0]), float(b[0])))
-        y0, y1 = sorted((float(a[1]), float(b[1])))
-        for piece, (u0, v0, u1, v1) in self._pieces:
-            is_near = u0 <= x0 and x1 <= u1 and v0 <= y0 and y1 <= v1
-            if is_near and piece.holds(a) and piece.holds(b):
-                return piece
-        if self._is_outside(a, b) or any(_inside(c, a, b) for c in self._polygons):
-            return None
-        if halvings == MAX_HALVINGS:
-            raise Refused(f"edge from {_text(a)} to {_text(b)}: is not in an obstacle")
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-        self.holder(a, middle, halvings + 1)
-        self.holder(middle, b, halvings + 1)
-        return None
-
-    def _is_outside(self, a: Exact, b: Exact) -> bool:
-        """Return whether an edge is outside the box, or on its border."""
-        return bool(self._box) and any(
-            max(a[i], b[i]) <= self._box[i] or min(a[i], b[i]) >= self._box[i + 2] for i in (0, 1)
-        )
+                x, y, radius = float(piece.a[0]), float(piece.a[1]), float(piece.radius)
+                if radius >= MIN_RADIUS and max(abs(x), abs(y), radius) < MAX_COORDINATE:
+                    self.disks[a, b] = x, y, radius
+            u0, v0, u1, v1 = _frame(Piece(start, end, Fraction(near)))
+            for p, x, y in places:
+                if u0 <= x <= u1 and v0 <= y <= v1 and _distance2(p, start, end) < border.delta**2:
+                    raise Refused(f"edge {(a, b)}: expected δ to the base and all goals")
 
 
 def turn(a: Point, b: Point, c: Point) -> int:
@@ -196,23 +177,49 @@ def turn(a: Point, b: Point, c: Point) -> int:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def distance2(p: Exact, a: Exact, b: Exact) -> Fraction:
+def exact(p: Point) -> Exact:
+    """Return a point of the grid in exact numbers."""
+    return Fraction(p[0]), Fraction(p[1])
+
+
+def _usable(problem: Problem, box: list[int] | None, delta: Fraction) -> list[Obstacle]:
+    """Return the obstacles that may bound triangles: all, or those within the box (Lemma 3)."""
+    bounds = problem.bounds
+    if box is None:
+        if bounds is None:
+            raise Refused("box: expected one, because the problem has no bounds")
+        return list(problem.obstacles)
+    if bounds is not None and not _encloses(bounds, box[:2], box[2:]):
+        raise Refused("box: reaches beyond the bounds")
+    if not all(_encloses(box, p, p) for p in problem.places):
+        raise Refused("box: does not hold the base and all goals")
+    room = 4 * delta + 1  # the way along the box must be free
+    inner = [box[0] + room, box[1] + room, box[2] - room, box[3] - room]
+    return [o for o in problem.obstacles if _encloses(inner, *o.span())]
+
+
+def _encloses(box: Sequence[float | Fraction], low: Sequence, high: Sequence) -> bool:  # type: ignore[type-arg]
+    """Return whether a box holds another one, given by two corners."""
+    return all(box[i] <= low[i] and high[i] <= box[i + 2] for i in (0, 1))
+
+
+def _distance2(p: Exact, a: Exact, b: Exact) -> Fraction:
     """Return the squared distance of a point from a segment."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     x, y = p[0] - a[0], p[1] - a[1]
     along, length2 = x * dx + y * dy, dx * dx + dy * dy
     if along > 0:
-        t = min(Fraction(along, length2), Fraction(1))
+        t = min(along / length2, Fraction(1))
         x, y = x - t * dx, y - t * dy
-    return Fraction(x * x + y * y)
+    return x * x + y * y
 
 
-def _exact(p: Point) -> Exact:
-    return Fraction(p[0]), Fraction(p[1])
-
-
-def _text(p: Exact) -> str:
-    return f"({float(p[0]):.0f}, {float(p[1]):.0f})"
+def _frame(piece: Piece) -> tuple[float, float, float, float]:
+    """Return a box (x0, y0, x1, y1) that holds a piece, despite rounding."""
+    reach = float(piece.radius) * (1.0 + 1e-6) + 1.0
+    x0, x1 = sorted((float(piece.a[0]), float(piece.b[0])))
+    y0, y1 = sorted((float(piece.a[1]), float(piece.b[1])))
+    return x0 - reach, y0 - reach, x1 + reach, y1 + reach
 
 
 def _edges(corners: Sequence[Exact]) -> list[tuple[Exact, Exact]]:
@@ -220,12 +227,7 @@ def _edges(corners: Sequence[Exact]) -> list[tuple[Exact, Exact]]:
     return [(corners[k - 1], c) for k, c in enumerate(corners)] if len(corners) > 1 else []
 
 
-def _encloses(low: Sequence[Fraction], high: Sequence[Fraction], first: Exact, last: Exact) -> bool:
-    """Return whether the box from low to high holds the one from first to last."""
-    return all(low[i] <= first[i] and last[i] <= high[i] for i in (0, 1))
-
-
-def _inside(corners: Sequence[Exact], a: Exact, b: Exact) -> bool:
+def _is_inside(corners: Sequence[Exact], a: Exact, b: Exact) -> bool:
     """Return whether a segment is inside a polygon and does not meet its edges."""
     is_inside = False
     for p, q in _edges(corners):
@@ -241,5 +243,4 @@ def _inside(corners: Sequence[Exact], a: Exact, b: Exact) -> bool:
 
 
 def _side(a: Exact, b: Exact, c: Exact) -> Fraction:
-    """Return twice the area of a triangle, positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

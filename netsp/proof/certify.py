@@ -17,7 +17,7 @@ from netsp.model.problem import Problem
 from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
 from netsp.proof.cover_instance import CoverInstance
 from netsp.proof.dual_search import DualSearch, DualSearchPolicy, ProofNode, ShorterTourError
-from netsp.proof.triangulate import grid_of, triangulate
+from netsp.proof.triangulate import triangulate
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp_check import Refused, check
 from netsp_check.dual_bound import Bound
@@ -145,9 +145,7 @@ class _Attempt:
         self.clock, self.on_progress = clock, on_progress
         self._graph = graph
         self.text = problem.to_json()
-        size = float(read_problem(self.text, 0).size) or solution_scale(problem)
-        self.grid = grid_of(size)
-        self.exact = read_problem(self.text, self.grid, solution.margin, solution.slack)
+        self.exact = read_problem(self.text, solution.margin, solution.slack)
         self.root_bound = 0.0
 
     def run(self) -> Certificate:
@@ -155,7 +153,7 @@ class _Attempt:
         length = self.solution.length
         target = None
         if length is not None:
-            target = int(np.floor(length * (1.0 - TARGET_SHARE) * 2.0**self.grid))
+            target = int(np.floor(length * (1.0 - TARGET_SHARE) * 2.0**self.exact.grid))
         reason = ""
         for corners in self.policy.corners:
             try:
@@ -173,12 +171,12 @@ class _Attempt:
             return Certificate("none", str(error))
 
     def _certificate(self, target: int | None, corners: int, reason: str) -> Certificate:
-        proof: dict[str, Any] = {"format": "netsp-proof 1", "grid": self.grid, "target": target}
+        proof: dict[str, Any] = {"format": "netsp-proof 1", "target": target}
         for name in ("margin", "slack"):
             if getattr(self.solution, name):
                 proof[name] = getattr(self.solution, name)
         proof |= triangulate(self.exact, corners).to_fields()
-        _, tree = cover(self.text, proof)
+        tree = cover(self.text, proof)
         self.on_progress(f"{len(tree.vertices)} classes in {len(tree.nodes)} triangles")
         if len(tree.vertices) > self.policy.max_vertices:
             raise LimitReachedError(f"there are more than {self.policy.max_vertices} classes")
@@ -206,7 +204,7 @@ class _Attempt:
             raise LimitReachedError("the tour's classes were not found again")
 
         def on_round(bound: float) -> None:
-            self.on_progress(f"bound {bound * 2.0**-self.grid:.6g}")
+            self.on_progress(f"bound {bound * 2.0**-self.exact.grid:.6g}")
 
         search = DualSearch(
             instance, tour, target, self.clock, self.policy.search, on_round=on_round
@@ -229,8 +227,3 @@ class _Attempt:
     def _check(self) -> None:
         if self.clock.is_up:
             raise LimitReachedError("time is up")
-
-
-def solution_scale(problem: Problem) -> float:
-    """Return a size for a problem whose goals are all above the base."""
-    return problem.tether_length

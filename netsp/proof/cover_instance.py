@@ -75,7 +75,7 @@ class CoverInstance:
         start, end = tree.vertices[0], tree.vertices[vertex]
         gates = [(points[a], points[b]) for a, b in tree.gates(start, end)]
         path, _ = shortest_path(start.at, end.at, gates)
-        xy = np.array([p for p, _ in path], dtype=float) * scale + np.array(problem.base[:2])
+        xy = np.array(path, dtype=float) * scale + np.array(problem.base[:2])
         return signature(xy, problem.representative_points)
 
     def _estimates(self, graph: TravelGraph, check: Callable[[], None]) -> Floats:

@@ -13,19 +13,9 @@ from netsp.base.arrays import Floats
 from netsp_check.problem_file import Obstacle, Problem
 from netsp_check.triangulation import RESOLUTION
 
-if TYPE_CHECKING:
-    pass
-
-GRID_BITS = 36
-"""Format constant: the size of a problem is between 2^35 and 2^36 grid units."""
 
 INSET = 4.0
 """Tolerance: grid units by which polygons stay inside obstacles, so that rounding does not matter."""
-
-
-def grid_of(size: float) -> int:
-    """Return the exponent of the grid for a problem of a size."""
-    return GRID_BITS - math.frexp(size)[1]
 
 
 @dataclass(frozen=True)
