@@ -25,8 +25,8 @@ def sentences(problem: dict[str, Any], shown: Checked) -> list[str]:
     if shown.margin or shown.slack:
         out.append(f"Obstacles are grown by {shown.margin:g} {unit}; slack {shown.slack:g}.")
     if n := shown.closed_gaps:
-        out.append(f"Gaps narrower than a billionth of the size count as closed: there are {n}.")
-    return out + [f"Left out: {r}, which never make tours shorter." for r in shown.left_out]
+        out.append(f"Gaps below three billionths of the size count as closed: there are {n}.")
+    return out
 
 
 def compared(tour: dict[str, Any], shown: Checked) -> str:

@@ -130,6 +130,8 @@ class Bound:
     ----------
     target
         In grid units; None to check that there is no tour at all.
+    allowed
+        Pairs of clusters that precedences allow to be adjacent.
     leaves
         Number of leaves of the branching tree that were closed.
     """
@@ -140,7 +142,7 @@ class Bound:
         problem = tree.triangulation.problem
         self.cluster = [problem.cluster[v.place] for v in tree.vertices]
         self.clusters = max(problem.cluster) + 1
-        self._before, self._allowed = problem.before, _allowed(problem.before, self.clusters)
+        self._before, self.allowed = problem.before, _allowed(problem.before, self.clusters)
         self._cuts: list[Cut] = []
 
     def check(self, node: dict[str, Any], cuts: list[Any]) -> None:
@@ -169,7 +171,7 @@ class Bound:
             if self._is_possible(alive):
                 stage = Stage(data, self._cuts, self.cluster, adjacent)
                 alive, legs = self._strike_out(stage, alive, legs)
-        if not self._is_possible(alive) or _is_out_of_order(adjacent, self._before):
+        if not self._is_possible(alive) or is_out_of_order(adjacent, self._before):
             self.leaves += 1
         elif legs is None:
             raise Refused("node: expected a stage before it branches")
@@ -260,7 +262,7 @@ class Bound:
                     limit = stage.reach + stage.potential[u] - beyond + farthest + SLACK
                     low = max(bisect.bisect_left(at_node, first), u + 1)
                     for v in range(low, bisect.bisect_left(at_node, last)):
-                        if own[v] < limit and v in alive and self._pair(u, v) in self._allowed:
+                        if own[v] < limit and v in alive and self._pair(u, v) in self.allowed:
                             yield u, v
                 child, node = node, nodes[node].parent
                 beyond = math.floor(vertices[u].reach - nodes[child].farthest)
@@ -275,7 +277,7 @@ def _allowed(before: frozenset[Pair], clusters: int) -> set[Pair]:
     return {pair for pair in combinations(range(clusters), 2) if pair not in apart}
 
 
-def _is_out_of_order(adjacent: set[Pair], before: frozenset[Pair]) -> bool:
+def is_out_of_order(adjacent: set[Pair], before: frozenset[Pair]) -> bool:
     """Return whether adjacent pairs form a path that precedences exclude (Lemma 15)."""
     near: dict[int, list[int]] = {}
     for g, h in adjacent:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from netsp_check.covering_tree import LEFT, RIGHT, CoveringTree, Funnel
@@ -79,7 +80,7 @@ class LegBounds:
         """Return the arc between each edge and the next one, None where there is none."""
         points, disks = self.tree.triangulation.points, self.tree.triangulation.disks
         out: list[Arc | None] = []
-        for before, after in zip(edges, edges[1:], strict=False):
+        for before, after in pairwise(edges):
             side = LEFT if before[LEFT] != after[LEFT] else RIGHT
             a, b = before[side], after[side]
             disk = disks.get((b, a) if side == LEFT else (a, b))  # its triangle is on its left

@@ -131,12 +131,12 @@ class Triangulation:
         self.disks: dict[tuple[int, int], Disk] = {}
         self._check_border(Border(problem, box, bridges))
 
-    def locate(self, k: int) -> tuple[list[int], Point]:
-        """Return all triangles that hold place k, and the grid point nearest to the place."""
-        at = round(self.problem.places[k][0]), round(self.problem.places[k][1])
+    def locate(self, number: int) -> tuple[list[int], Point]:
+        """Return all triangles that hold a place, and the grid point nearest to the place."""
+        at = round(self.problem.places[number][0]), round(self.problem.places[number][1])
         found = []
-        for t, (i, j, l) in enumerate(self.triangles):
-            a, b, c = self.points[i], self.points[j], self.points[l]
+        for t, (i, j, k) in enumerate(self.triangles):
+            a, b, c = self.points[i], self.points[j], self.points[k]
             if turn(a, b, at) >= 0 and turn(b, c, at) >= 0 and turn(c, a, at) >= 0:
                 found.append(t)
         return found, at

@@ -189,7 +189,7 @@ class _Attempt:
         elif target is None or bound.clusters == 2:
             raise ShorterTourError
         else:
-            instance = CoverInstance(self.problem, self.graph, tree, legs, alive, self._check)
+            instance = CoverInstance(self.problem, self.graph, bound, alive, self._check)
             proof |= self._search(instance, target).to_fields(instance, bound.cluster)
         data = zlib.compress(json.dumps(proof, separators=(",", ":")).encode(), 9)
         self.on_progress(f"proof of {len(data)} bytes; checking")

@@ -11,8 +11,8 @@ from netsp.hsignature import Word
 from netsp.hsignature.rays import signature
 from netsp.model.problem import Problem
 from netsp.roadmap.travel_graph import TravelGraph
-from netsp_check.covering_tree import CoveringTree
-from netsp_check.leg_bounds import LegBounds, shortest_path
+from netsp_check.dual_bound import Bound
+from netsp_check.leg_bounds import shortest_path
 
 
 class CoverInstance:
@@ -27,20 +27,22 @@ class CoverInstance:
     labels
         Word of the tether at each vertex.
     costs
-        (n, n) costs in grid units, inf within a cluster. They are estimates, until `settle`
-        replaces them by the checker's own.
+        (n, n) costs in grid units; inf within a cluster, and where precedences exclude a leg. They
+        are estimates, until `settle` replaces them by the checker's own.
+    before
+        Pairs of clusters of which the first is visited before the second.
     """
 
     def __init__(
         self,
         problem: Problem,
         graph: TravelGraph,
-        tree: CoveringTree,
-        legs: LegBounds,
+        bound: Bound,
         vertices: Iterable[int],
         check: Callable[[], None] = lambda: None,
     ) -> None:
-        self.tree, self.legs = tree, legs
+        tree = bound.tree
+        self.tree, self.legs, self.before = tree, bound.legs, tree.triangulation.problem.before
         self.vertices: Ints = np.array(sorted(vertices), dtype=np.int64)
         of_place = np.array(tree.triangulation.problem.cluster)
         place = np.array([tree.vertices[v].place for v in self.vertices.tolist()])
@@ -52,6 +54,10 @@ class CoverInstance:
         at = [known.get((p, w), -1) for p, w in zip(place.tolist(), self.labels, strict=True)]
         self.at: Ints = np.array(at, dtype=np.int64)
         self.costs = self._estimates(graph, check)
+        is_allowed = np.zeros((bound.clusters, bound.clusters), dtype=bool)
+        for g, h in bound.allowed:
+            is_allowed[g, h] = is_allowed[h, g] = True
+        self.costs[~is_allowed[np.ix_(self.cluster, self.cluster)]] = np.inf
         self._is_settled: Bools = np.zeros(self.costs.shape, dtype=bool)
 
     def rows_of(self, graph_vertices: Iterable[int]) -> list[int] | None:
@@ -93,5 +99,4 @@ class CoverInstance:
             for j in np.flatnonzero(self.cluster != self.cluster[i]).tolist():
                 bound = self.legs.bound(int(self.vertices[i]), int(self.vertices[j]), 1)
                 out[i, j] = out[j, i] = bound
-        out[self.cluster[:, None] == self.cluster[None, :]] = np.inf
         return out

@@ -22,6 +22,7 @@ from netsp.mip.root import tour_legs
 from netsp.mip.subtours import fractional_cuts, label_families
 from netsp.proof.cover_instance import CoverInstance
 from netsp.proof.dual_stage import CutTable, DualStage, Pair, Struck, strike_out
+from netsp_check.dual_bound import is_out_of_order
 
 NEGATIVE_TOLERANCE = 1e-9
 """Tolerance, as a share of the target, below zero for the reduced cost of a leg that is priced
@@ -245,13 +246,14 @@ class DualSearch:
             Pairs of clusters that must be adjacent.
         """
         while True:
+            if is_out_of_order(set(adjacent), self.instance.before):
+                self._close_leaf()
+                return
             point = self._cut(alive, adjacent)
             before = np.count_nonzero(alive)
             vertices, alive = self._strike_out(node, point, vertices, alive, adjacent)
             if not alive.any():
-                self.leaves += 1
-                if self.leaves > self.policy.max_leaves:
-                    raise LimitReachedError("the branching tree has too many leaves")
+                self._close_leaf()
                 return
             if np.count_nonzero(alive) > self.policy.min_left * before:
                 break
@@ -259,6 +261,11 @@ class DualSearch:
         for some, pairs in parts:
             node.children.append(ProofNode())
             self._branch(node.children[-1], vertices, some, pairs)
+
+    def _close_leaf(self) -> None:
+        self.leaves += 1
+        if self.leaves > self.policy.max_leaves:
+            raise LimitReachedError("the branching tree has too many leaves")
 
     def _cut(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Point:
         """Return the LP's last point after rounds of cuts."""
@@ -382,6 +389,10 @@ class DualSearch:
                 if distance.ravel()[k] > 1e-6:
                     at = np.unravel_index(k, values.shape)
                     yield ((int(at[0]), int(at[1])), None) if len(at) == 2 else (None, int(at[0]))
+        if self.instance.before:
+            # a whole solution may still visit clusters in the wrong order
+            for g, h in np.argwhere(between > 1.0 - 1e-6)[: self.policy.candidates].tolist():
+                yield (g, h), None
 
     def _parts(
         self, pair: Pair | None, vertex: int | None, alive: Bools, adjacent: tuple[Pair, ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,8 @@ from netsp.base.arrays import Floats
 from netsp_check.problem_file import Obstacle, Problem
 from netsp_check.triangulation import RESOLUTION
 
-
 INSET = 4.0
-"""Tolerance: grid units by which polygons stay inside obstacles, so that rounding does not matter."""
+"""Tolerance: grid units by which polygons stay inside obstacles, despite rounding."""
 
 
 @dataclass(frozen=True)
