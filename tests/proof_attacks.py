@@ -16,6 +16,7 @@ import math
 import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from netsp import Problem, Solution, solve
@@ -65,12 +66,14 @@ def to_bytes(proof: Json) -> bytes:
     return json.dumps(proof).encode()
 
 
-def relaxed_optimum(text: str, proof: Json) -> float:
-    """Return the length of the shortest tour over a proof's cover and the checker's legs, by
-    brute force: no duals over this cover can prove more."""
-    problem, tree = cover(text, {**proof, "target": None})
+def relaxed_optimum(text: str, proof: Json, limit: float) -> float:
+    """Return the length of the shortest tour over a proof's cover and the checker's legs, but at
+    most a limit, by brute force: no duals over this cover can prove more."""
+    grid = int(proof["grid"])
+    target = int(limit * 2.0**grid)
+    _, tree = cover(text, {**proof, "target": target})
     legs = LegBounds(tree)
-    bound = Bound(tree, legs, None)
+    bound = Bound(tree, legs, target)
     members: list[list[int]] = [[] for _ in range(bound.clusters)]
     for v in sorted(bound.reachable()):
         members[bound.cluster[v]].append(v)
@@ -86,7 +89,7 @@ def relaxed_optimum(text: str, proof: Json) -> float:
             if not lengths:
                 break
         best = min([best, *lengths.values()])
-    return best * 2.0**-problem.grid
+    return min(best * 2.0**-grid, limit)
 
 
 # mutations: each changes a problem or a proof in place
@@ -464,14 +467,15 @@ class Outcome:
         "refused", "true" for a proof that is accepted and does not claim too much, "false" for one
         that does, "open" if a cover was accepted over which duals could prove too much, "crash" if
         the checker raised another error, and "void" if the problem is none.
-    names
-        Names of the mutations.
+    names, first
+        Names of all mutations, and of the first one.
     detail
         What was said or claimed.
     """
 
     kind: str
     names: str
+    first: str
     detail: str = ""
     text: str = ""
     proof: Json | None = None
@@ -492,22 +496,29 @@ def attack(proven: Proven, seed: int) -> Outcome:
             break  # an earlier mutation has put another kind of value there
     names = " + ".join(m.__name__ for m in chosen)
     text = json.dumps(problem)
-    kind, detail = _judge(text, proof, _is_geometric(chosen))
-    return Outcome(kind, names, detail, text, proof)
+    kind, detail = _judge(text, proof, proven.solution.length if _is_geometric(chosen) else None)
+    return Outcome(kind, names, chosen[0].__name__, detail, text, proof)
+
+
+def save(outcome: Outcome, path: Path) -> None:
+    """Write the problem and the proof of an outcome, to PATH.problem.json and PATH.proof."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.with_suffix(".problem.json").write_text(outcome.text, encoding="utf-8")
+    path.with_suffix(".proof").write_bytes(to_bytes(outcome.proof or {}))
 
 
 def _is_geometric(chosen: list[Mutation]) -> bool:
     return any(m in OF_COVER or m in OF_PROBLEM for m in chosen)
 
 
-def _judge(text: str, proof: Json, is_geometric: bool) -> tuple[str, str]:
+def _judge(text: str, proof: Json, length: float | None) -> tuple[str, str]:
     kind, detail, bound = _checked(text, proof)
     if kind == "crash":
         return kind, detail
     relaxed = -math.inf
-    if is_geometric:
+    if length is not None:
         with contextlib.suppress(Exception):  # no cover, which `check` reports
-            relaxed = relaxed_optimum(text, proof)
+            relaxed = relaxed_optimum(text, proof, 1.2 * length)
     if max(bound, relaxed) == -math.inf:
         return kind, detail
     optimum = _optimum(text, proof)
