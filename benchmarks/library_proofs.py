@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import fnmatch
 import hashlib
+import signal
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,13 +21,27 @@ from types import SimpleNamespace
 from library_worlds import FOLDER
 
 from netsp import Problem, Solution, solve
-from netsp.base.errors import NetspError
+from netsp.base.errors import LimitReachedError, NetspError
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.proof.certify import certify
 from netsp.study.library import Library, Record
 
 SOLVE_S = 30.0
 """Time limit of a solve before each proof, s."""
+
+MAX_OVERTIME_RATIO = 2.0
+"""Limit of a proof and its check, relative to the time limit; then the problem is given up."""
+
+
+def give_up(*_: object) -> None:
+    """End a proof that does not heed its time limit.
+
+    Raises
+    ------
+    LimitReachedError
+        Always.
+    """
+    raise LimitReachedError("time is up")
 
 
 def best_known(problem: Problem, record: Record) -> Solution:
@@ -42,12 +57,16 @@ def prove(library: Library, name: str, limit: float) -> str:
     """Publish a proof for a record, and return why it is not optimal; empty if it is."""
     problem, record = library.problem(name), library.records[name]
     begin = time.perf_counter()
+    signal.alarm(round(SOLVE_S + MAX_OVERTIME_RATIO * limit))
     try:
         found = certify(problem, best_known(problem, record), time_limit=limit)
         if found.proof is not None:
             library.publish(name, found.proof)
     except NetspError as error:
+        print(f"{name}: {error}", flush=True)
         return str(error)
+    finally:
+        signal.alarm(0)
     took, size = time.perf_counter() - begin, len(found.proof or b"")
     print(f"{name}: {found.level}, {size} bytes, {took:.1f} s {found.reason}", flush=True)
     return "" if found.level == "optimal" else f"{found.level}: {found.reason}"
@@ -56,6 +75,7 @@ def prove(library: Library, name: str, limit: float) -> str:
 def make(limit: float, only: str, failures: Path | None, *, again: bool) -> None:
     """Make the proofs that are missing."""
     library = Library(FOLDER)
+    signal.signal(signal.SIGALRM, give_up)
     if again:
         bare = {"proof": None}
         library.records = {n: r.model_copy(update=bare) for n, r in library.records.items()}
