@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from netsp import Problem, solve
-from netsp.base.errors import InputError
+from netsp.base.errors import InfeasibleError, InputError
+from netsp.command.main import main
 from netsp.proof.certify import CertifyPolicy, certify
 from netsp.proof.dual_search import DualSearchPolicy
 from netsp.proof.vipr_export import vipr
@@ -134,3 +135,58 @@ FEW_CUTS = DualSearchPolicy(max_idle_rounds=0, min_rise=10.0)
 
 def target_of(proof):
     return json.loads(zlib.decompress(proof))["target"]
+
+
+@pytest.fixture(scope="module")
+def branched():
+    text, proof = proof_of("library/maze-20-0", FEW_CUTS)
+    return proof, vipr(text, proof)
+
+
+def test_a_proof_of_one_stage_is_derived():
+    text, proof = proof_of("library/jacket-6-0")
+    assert verified_bound(vipr(text, proof)) == target_of(proof)
+
+
+def test_strikes_and_branches_of_a_proof_are_derived(branched):
+    proof, file = branched
+    assert len(json.loads(zlib.decompress(proof))["tree"]["stages"]) > 1
+    assert file.count("{ rnd") > 100
+    assert file.count("{ uns") > 1
+    assert verified_bound(file) == target_of(proof)
+
+
+def test_a_larger_bound_and_changed_numbers_are_not_derived(branched):
+    proof, file = branched
+    target = target_of(proof)
+    with pytest.raises(Wrong, match="what was to be proven"):
+        verified_bound(file.replace(f"RTP range {target} inf", f"RTP range {target + 1} inf"))
+    lines = file.splitlines()
+    derived = [k for k, x in enumerate(lines) if "{ lin" in x]
+    for k in derived[:: len(derived) // 20]:
+        head, reason = lines[k].split("{")
+        name, sense, rhs, *coefs = head.split()
+        changed = " ".join([name, sense, str(int(rhs) - 1), *coefs, "{" + reason])
+        with pytest.raises(Wrong, match="domination"):
+            verified_bound("\n".join([*lines[:k], changed, *lines[k + 1 :]]))
+
+
+def test_a_file_without_a_program_is_refused():
+    problem = Problem.load(FOLDER / "library" / "maze-5-0.json")
+    short = problem.model_copy(update={"tether_length": 1.0})
+    with pytest.raises(InfeasibleError):
+        solve(short)
+    proof = {"format": "netsp-proof 1", "target": None, "tree": {}}
+    with pytest.raises(InputError, match="there is no program for VIPR"):
+        vipr(short.to_json(), json.dumps(proof).encode())
+
+
+def test_the_command_writes_the_file_beside_the_proof(tmp_path, capsys):
+    problem, proof, file = str(FOLDER / "library" / "jacket-6-0.json"), "a.proof", "a.vipr"
+    proof, file, out = (str(tmp_path / name) for name in (proof, file, "tour.json"))
+    words = ["solve", problem, "-o", out, "--quiet"]
+    assert main([*words, "--proof", proof, "--proof-vipr", file]) == 0
+    assert verified_bound(Path(file).read_text()) == target_of(Path(proof).read_bytes())
+    assert main([*words, "--proof-vipr", str(tmp_path / "b.vipr")]) == 2
+    assert "expected --proof FILE beside it" in capsys.readouterr().err
+    assert not (tmp_path / "b.vipr").exists()

@@ -113,6 +113,11 @@ FOR_PROBLEMS = (
         "prove the tour and write the proof, which `netsp verify --proof` and `python -m "
         "netsp_check` check without the solver (roadmap taut only)",
     ),
+    Output(
+        "--proof-vipr FILE",
+        "with --proof: also write the last program of the proof in the format of VIPR, whose "
+        "checker then derives the bound from it",
+    ),
     Option(
         "--slack S",
         "slack tether that must fit in addition, as a share of the taut length, such as 0.05",

@@ -22,6 +22,10 @@ def check_provable(args: argparse.Namespace, problem: Problem) -> None:
     from netsp.base.files import STANDARD
     from netsp.model.solution import EXACT_ROADMAPS
 
+    if args.proof_vipr and args.proof is None:
+        raise InputError(
+            "--proof-vipr: derives only the last part of a proof; expected --proof FILE beside it"
+        )
     if args.proof is None:
         return
     if args.proof == STANDARD:
@@ -39,7 +43,12 @@ def check_provable(args: argparse.Namespace, problem: Problem) -> None:
 
 
 def with_proof(
-    file: str, problem: Problem, solution: Solution, clock: Clock, tell: Callable[[str], None]
+    file: str,
+    problem: Problem,
+    solution: Solution,
+    clock: Clock,
+    tell: Callable[[str], None],
+    vipr_file: str | None = None,
 ) -> Solution:
     """Write a proof for a solution, and return the solution with what the proof shows.
 
@@ -54,6 +63,8 @@ def with_proof(
         Clock of the command.
     tell : callable
         Called with a line of progress.
+    vipr_file : str, optional
+        Name of a file for VIPR, which derives the proof's bound from its program.
     """
     from netsp.base.files import write_bytes
     from netsp.base.interrupt_signals import deferred_interrupts
@@ -64,6 +75,8 @@ def with_proof(
         try:
             with deferred_interrupts():
                 write_bytes(file, certificate.proof)
+            if vipr_file:
+                _write_for_vipr(vipr_file, problem, certificate.proof, clock)
             return solution.with_certificate(certificate.level, certificate.bound, reason)
         except InputError as error:
             reason = str(error)
@@ -72,6 +85,18 @@ def with_proof(
     old = "; the file of that name is an older one" if os.path.exists(file) else ""
     messages.warning(f"no proof: {reason}; {file} was not written{old}")
     return solution.with_certificate("none", reason=reason)
+
+
+def _write_for_vipr(file: str, problem: Problem, proof: bytes, clock: Clock) -> None:
+    """Write the file for VIPR; if there is none, a warning says why."""
+    from netsp.base.files import write_text
+    from netsp.proof.vipr_export import vipr
+
+    try:
+        text = clock.bounded("exporting for VIPR", lambda: vipr(problem.to_json(), proof))
+        write_text(file, text)
+    except (InputError, LimitReachedError) as error:
+        messages.warning(f"no file for VIPR: {error}; {file} was not written")
 
 
 def _certificate(

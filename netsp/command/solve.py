@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         except InfeasibleError as error:
             if args.proof:
                 none = proving.infeasible_solution(problem, args)
-                none = proving.with_proof(args.proof, problem, none, clock, tell)
+                none = proving.with_proof(args.proof, problem, none, clock, tell, args.proof_vipr)
                 if table and none.certified == "optimal":
                     print(proof_line(problem, none, args.proof), file=sys.stderr)
             if args.json:
@@ -141,7 +141,7 @@ def _proven(
     if is_interrupted:
         clock.end()
     try:
-        return proving.with_proof(args.proof, problem, solution, clock, tell)
+        return proving.with_proof(args.proof, problem, solution, clock, tell, args.proof_vipr)
     except Exception:
         _write(args, solution)
         raise
