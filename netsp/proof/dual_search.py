@@ -34,7 +34,17 @@ some costs are estimates here."""
 
 
 class ShorterTourError(Exception):
-    """A tour over the checker's bounds on legs is shorter than the target."""
+    """A tour over the checker's bounds on legs is shorter than the target.
+
+    Attributes
+    ----------
+    length
+        Length of that tour, in grid units.
+    """
+
+    def __init__(self, length: float) -> None:
+        super().__init__(f"{length:g}")
+        self.length = length
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,8 @@ class DualSearchPolicy:
         Simplex steps of a probe.
     max_leaves
         Leaves of the branching tree after which the search gives up.
+    max_root_gap
+        The search gives up if the root's bound is below the target by more than this share.
     min_left
         A node gets another stage while the last one left less than this share of its legs.
     """
@@ -68,6 +80,7 @@ class DualSearchPolicy:
     candidates: int = 6
     probe_steps: int = 200
     max_leaves: int = 200
+    max_root_gap: float = 0.05
     min_left: float = 0.7
 
 
@@ -160,11 +173,13 @@ class DualSearch:
         lp = self._relaxation(self._first_legs())
         while True:
             point = self._price_and_cut(lp, legs)
+            self.root_bound = point.objective
+            if point.objective < self.target * (1.0 - self.policy.max_root_gap):
+                raise LimitReachedError("the bound of the root is far below the tour")
             stage = _stage(point.duals, lp.cuts, {})
             if not self._settle(stage, vertices, legs):
                 break
             lp.set_costs(instance.costs[lp.legs[:, 0], lp.legs[:, 1]])
-        self.root_bound = point.objective
         struck = self._add_stage(root, stage, vertices, legs, REACH_ROOM * self.target)
         left = np.argwhere(np.triu(struck.legs))
         if len(left):
@@ -368,7 +383,7 @@ class DualSearch:
             if gains[0] * gains[1] > best_gain:
                 best, best_gain = (pair, vertex, parts), gains[0] * gains[1]
         if best is None:
-            raise ShorterTourError
+            raise ShorterTourError(point.objective + self._charge * len(adjacent))
         node.pair, node.vertex, parts = best
         if node.pair is not None and node.pair[0]:
             inside = np.isin(self.instance.cluster, node.pair)
