@@ -31,7 +31,7 @@ def test_the_printed_proof_holds_and_a_higher_target_does_not():
 
 def test_the_page_states_the_legs_that_the_checker_finds():
     """Each leg's number in the checker is on the page."""
-    _, tree = cover(PROBLEM, printed_proof())
+    tree = cover(PROBLEM, printed_proof())
     legs = LegBounds(tree)
     for u, v in ((0, 1), (0, 2), (1, 2)):
         assert str(legs.bound(u, v, 2)) in PAGE
