@@ -116,10 +116,8 @@ def measured(problem: Problem, limit: float) -> Measured:
     begin = time.monotonic()
     found = check(text, certificate.proof)
     check_s = time.monotonic() - begin
-    if (
-        solution.length is None
-        or not 0.0 <= solution.length - found.bound <= 1e-6 * solution.length
-    ):
+    length = solution.length or 0.0
+    if not 0.0 <= length - found.bound <= 1e-6 * length:
         return Measured(solve_s, reason=f"bound {found.bound}, tour {length}")
     write_s = max(total - check_s, 0.0)
     return Measured(solve_s, write_s, check_s, len(certificate.proof), found.vertices)
