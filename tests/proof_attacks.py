@@ -27,6 +27,7 @@ from netsp_check import Refused, check
 from netsp_check.covering_tree import CoveringTree
 from netsp_check.dual_bound import Bound
 from netsp_check.leg_bounds import LegBounds
+from netsp_check.problem_file import read_problem
 from netsp_check.proof_check import cover, read_proof
 
 Json = dict[str, Any]
@@ -56,7 +57,7 @@ def honest(problem: Problem) -> Proven:
 
 def rehash(text: str, proof: Json) -> CoveringTree:
     """Write number and hash of the classes of a changed proof, and return its cover."""
-    _, tree = cover(text, proof)
+    tree = cover(text, proof)
     proof["classes"] = [len(tree.vertices), tree.digest()]
     return tree
 
@@ -69,9 +70,9 @@ def to_bytes(proof: Json) -> bytes:
 def relaxed_optimum(text: str, proof: Json, limit: float) -> float:
     """Return the length of the shortest tour over a proof's cover and the checker's legs, but at
     most a limit, by brute force: no duals over this cover can prove more."""
-    grid = int(proof["grid"])
+    grid = read_problem(text).grid
     target = int(limit * 2.0**grid)
-    _, tree = cover(text, {**proof, "target": target})
+    tree = cover(text, {**proof, "target": target})
     legs = LegBounds(tree)
     bound = Bound(tree, legs, target)
     members: list[list[int]] = [[] for _ in range(bound.clusters)]
@@ -328,20 +329,12 @@ def add_bridges(rng: random.Random, problem: Json, proof: Json) -> None:
         points[k : k + 2] = bridges[-1][:2]
 
 
-def change_grid(rng: random.Random, problem: Json, proof: Json) -> None:
-    """Take a finer or a coarser grid, with the points and duals scaled or not."""
-    bits = rng.choice([-34, -30, -20, -3, -1, 1, 5, 20, 80, 200])
-    proof["grid"] += bits
-    if rng.random() < 0.8:
-        for name in ("points", "box"):
-            if name in proof:
-                proof[name] = [v << bits if bits > 0 else v >> -bits for v in proof[name]]
-        if proof["target"] is not None:
-            proof["target"] = int(proof["target"] * 2.0**bits)
-        for stage in _stages(proof["tree"]):
-            stage["a"] = [int(a * 2**bits) for a in stage["a"]]
-            stage["cuts"] = [[k, int(b * 2**bits)] for k, b in stage["cuts"]]
-            stage["reach"] = int(stage.get("reach", 0) * 2**bits)
+def scale_cover(rng: random.Random, problem: Json, proof: Json) -> None:
+    """Shrink or stretch the triangulation, and perhaps its box with it."""
+    bits = rng.choice([-30, -3, -1, 1, 8, 80])
+    for name in ("points", "box") if rng.random() < 0.7 else ("points",):
+        if name in proof:
+            proof[name] = [v << bits if bits > 0 else v >> -bits for v in proof[name]]
 
 
 def raise_target(rng: random.Random, problem: Json, proof: Json) -> None:
@@ -355,7 +348,7 @@ def raise_target(rng: random.Random, problem: Json, proof: Json) -> None:
 def change_kinds(rng: random.Random, problem: Json, proof: Json) -> None:
     """Put a number of another kind, or something else, where a whole number belongs."""
     odd = rng.choice([True, None, 1.5, math.inf, -math.inf, math.nan, "7", [], {}, 1 << 5000, -1])
-    where = rng.choice(["target", "grid", "points", "triangles", "box", "a", "b", "reach", "set",
+    where = rng.choice(["target", "points", "triangles", "box", "a", "b", "reach", "set",
                         "classes", "tree", "margin", "slack", "bridges", "p", "pair"])  # fmt: skip
     stage = _stage(rng, proof)
     if where in ("points", "triangles", "box", "classes") and proof.get(where):
@@ -416,10 +409,17 @@ def change_tether(rng: random.Random, problem: Json, proof: Json) -> None:
 
 
 def change_goals(rng: random.Random, problem: Json, proof: Json) -> None:
-    """Drop, swap or rename goals, or make two of them alternatives."""
+    """Drop, swap or rename goals, make two of them alternatives, or change their order."""
     goals = problem["goals"]
-    kind = rng.randrange(4)
-    if kind == 0 and len(goals) > 1:
+    kind = rng.randrange(6)
+    if kind == 4:
+        for goal in goals:
+            goal["after"] = []
+    elif kind == 5 and len(goals) > 1:
+        first, second = rng.sample(range(len(goals)), 2)
+        goals[first]["name"] = "the first one"
+        goals[second]["after"] = ["the first one"]
+    elif kind == 0 and len(goals) > 1:
         del goals[rng.randrange(len(goals))]
     elif kind == 1:
         rng.shuffle(goals)
@@ -441,7 +441,7 @@ OF_DUALS: tuple[Mutation, ...] = (
 """Mutations of the duals, the cuts and the branching tree."""
 
 OF_COVER: tuple[Mutation, ...] = (
-    move_point, change_triangles, add_sheet, split_point, change_box, add_bridges, change_grid,
+    move_point, change_triangles, add_sheet, split_point, change_box, add_bridges, scale_cover,
     grow_obstacles,
 )  # fmt: skip
 """Mutations of the triangulation."""
@@ -603,7 +603,7 @@ def _mesh(triangles: Iterator[Any]) -> Json:
 
 
 def _walled(
-    problem: Json, grid: int, wall: list[tuple[int, int]], half: int, share: float, **more: Any
+    problem: Json, wall: list[tuple[int, int]], half: int, share: float, **more: Any
 ) -> tuple[str, bytes]:
     """Return a proof whose triangles surround a wall of obstacles, from its lower to its upper end.
 
@@ -627,25 +627,30 @@ def _walled(
     length = solve(Problem.from_json(text)).length
     assert length is not None
     proof = {
-        "format": "netsp-proof 1", "grid": grid, "target": int(share * length * 2**grid),
+        "format": "netsp-proof 1", "target": int(share * length * _unit_of(text)),
         "box": [*sw, *ne], "tree": {}, **_mesh(iter(sides)), **more,
     }  # fmt: skip
     return _finished(text, proof)
 
 
+def _unit_of(text: str) -> int:
+    """Return the number of grid units in a unit of a problem."""
+    return 1 << read_problem(text).grid
+
+
 def closed_passage() -> tuple[str, bytes]:
     """A passage between two posts is closed by an edge."""
-    u = 1 << 30
+    u = 1 << 32  # the size is 10
     posts = [{"center": [5, y], "radius": 2} for y in (-3, 3)]
     problem = {"base": [0, 0], "goals": [[10, 0]], "obstacles": posts, "tether_length": 40}
     wall = [(5 * u, y * u // 8) for y in (-39, -38, -30, -8, 0, 8, 30, 38, 39)]
-    return _walled({"schema_version": 1, **problem}, 30, wall, 12 * u, 1.05)
+    return _walled({"schema_version": 1, **problem}, wall, 12 * u, 1.05)
 
 
 def box_at_obstacle() -> tuple[str, bytes]:
     """The box ends where the post does, which cuts off both ways around it."""
     text, proof, _ = _start()
-    u = 1 << proof["grid"]
+    u = _unit_of(text)
     left, right = (5 * u - 3, 5 * u + 3)
     rim, far = 2 * u - 1, 11 * u
     cells = [[(-u, -5 * u), (left, -rim), (left, rim), (-u, 4 * u)],
@@ -681,40 +686,50 @@ def huge_prices() -> tuple[str, bytes]:
     return _finished(text, {**proof, "cuts": [], "tree": {"stages": [stage]}})
 
 
-def huge_grid() -> tuple[str, bytes]:
-    """A grid so fine that every goal is beyond the number that stands for no limit."""
+def far_points() -> tuple[str, bytes]:
+    """Points so far away that floating-point numbers do not resolve a grid unit."""
     text, proof, _ = _start()
-    more = 120 - proof["grid"]
-    scaled = {k: [v << more for v in proof[k]] for k in ("points", "box")}
-    return _finished(text, {**proof, **scaled, "grid": 120, "target": None, "tree": {}, "cuts": []})
+    scaled = {k: [v << 30 for v in proof[k]] for k in ("points", "box")}
+    return _finished(text, {**proof, **scaled, "target": None, "tree": {}, "cuts": []})
 
 
-def coarse_grid() -> tuple[str, bytes]:
-    """A grid so coarse that a goal is rounded to the other side of a wall."""
-    far, half = 1000, 0.001
-    pier = [[-far, -far - half], [far, far - half], [far, far + half], [-far, -far + half]]
-    problem = {"base": [0, 300], "goals": [[499.55, 499.6]], "obstacles": [{"polygon": pier}]}
-    wall = [(k, k - 300) for k in (-999, -998, -500, 998, 999)]
-    wall = [wall[0], wall[1], wall[3], wall[4]]
-    s, s2, e2, e = wall
-    sw, se, ne, nw = (-1500, -1800), (1500, -1800), (1500, 1200), (-1500, 1200)
-    sides = [(s, s2, nw), (s2, e2, nw), (e2, e, nw), (s, nw, sw), (e, ne, nw)]
-    sides += [(s, se, e), (s, sw, se), (e, se, ne)]
-    right_first = sides[5:] + sides[:5]
-    text = json.dumps({"schema_version": 1, "tether_length": 9000, **problem})
-    length = solve(Problem.from_json(text)).length
-    assert length is not None
-    proof = {
-        "format": "netsp-proof 1", "grid": 0, "target": int(1.5 * length), "tree": {},
-        "box": [*sw, *ne], **_mesh(iter(right_first)),
-    }  # fmt: skip
-    return _finished(text, proof)
+def deep_goals() -> tuple[str, bytes]:
+    """Goals so deep for their distances that every tether exceeds the number for no limit."""
+    goals = [[1e-10, 0, -5e14], [0, 1e-10, -5e14]]
+    problem = {"schema_version": 1, "base": [0, 0], "goals": goals, "tether_length": 9e14}
+    far = 1 << 37
+    corners = [(-far, -far), (far, -far), (far, far), (-far, far)]
+    mesh = _mesh(iter([tuple(corners[:3]), (corners[0], *corners[2:])]))
+    proof = {"format": "netsp-proof 1", "target": None, "box": [-far, -far, far, far], **mesh}
+    return _finished(problem, {**proof, "tree": {}})
+
+
+def goal_at_edge() -> tuple[str, bytes]:
+    """An edge so near to a goal that rounding may put the goal beyond it."""
+    text, proof, _ = _start()
+    corners = zip(proof["points"][::2], proof["points"][1::2], strict=True)
+    u = _unit_of(text)
+    x, y = min(corners, key=lambda p: abs(math.hypot(p[0] - 5 * u, p[1]) - 2 * u))
+    problem = json.loads(text)
+    problem["goals"][2] = [(x + 5 * (x > 5 * u)) / u, y / u]
+    return _finished(problem, {**proof, "target": None, "tree": {}, "cuts": []})
+
+
+def order_left_out() -> tuple[str, bytes]:
+    """The proof of a problem in which one goal comes after another, without that order."""
+    goals = [{"name": "a", "position": [1, 0]}, {"position": [8, 0], "after": ["c"]},
+             {"name": "c", "position": [9, 3], "after": ["a"]}, {"position": [4, 4]}]  # fmt: skip
+    fields = {"schema_version": 1, "base": [0, 0], "tether_length": 60}
+    ordered = json.dumps({**fields, "goals": [{**goals[0], "after": ["d"]}, *goals[1:3],
+                                              {**goals[3], "name": "d"}]})  # fmt: skip
+    proven = honest(Problem.from_json(ordered))
+    problem = {**fields, "goals": [g["position"] for g in goals]}
+    return _finished(problem, copy.deepcopy(proven.proof))
 
 
 def bridges_in_a_row() -> tuple[str, bytes]:
     """A gap of 79 billionths of the size is closed by bridges from one to the next."""
-    grid = 33
-    u, delta = 1 << grid, 80  # δ is 10 u / 2^30
+    u, delta = 1 << 32, 40  # the size is 10, so δ is 10 u / 2^30
     gap = 79 * delta
     posts = [{"center": [5, s * (2.0 + gap / u / 2)], "radius": 2.0} for s in (1, -1)]
     problem = {"base": [0, 0], "goals": [[10, 0]], "obstacles": posts, "tether_length": 40}
@@ -723,7 +738,7 @@ def bridges_in_a_row() -> tuple[str, bytes]:
     top = [10 * delta + edge, 11 * delta + edge, u // 2, 39 * u // 10 - 5, 39 * u // 10]
     middle = range(-edge, edge, delta // 4)
     wall = [(5 * u, y) for y in (*(-y for y in top[::-1]), *middle, *top)]
-    return _walled({"schema_version": 1, **problem}, grid, wall, 12 * u, 1.05, bridges=bridges)
+    return _walled({"schema_version": 1, **problem}, wall, 12 * u, 1.05, bridges=bridges)
 
 
 def negative_multiplier() -> tuple[str, bytes]:
@@ -852,19 +867,21 @@ def endless_tree() -> tuple[str, bytes]:
 
 
 def goal_free() -> tuple[str, bytes]:
-    """A problem without goals."""
-    text, proof = _raised()
+    """A problem without goals: nothing takes a leg away from the bound."""
+    far = 1 << 37
+    corners = [(-far, -far), (far, -far), (far, far), (-far, far)]
+    mesh = _mesh(iter([tuple(corners[:3]), (corners[0], *corners[2:])]))
     stage = {"a": [0], "cuts": []}
-    return _finished(
-        {**json.loads(text), "goals": []}, {**proof, "cuts": [], "tree": {"stages": [stage]}}
-    )
+    proof = {"format": "netsp-proof 1", "target": far, "box": [-far, -far, far, far], **mesh}
+    problem = {"schema_version": 1, "base": [0, 0], "goals": [], "tether_length": 10}
+    return _finished(problem, {**proof, "tree": {"stages": [stage]}})
 
 
 FORGERIES: dict[str, Callable[[], tuple[str, bytes]]] = {
     f.__name__: f
     for f in (
-        closed_passage, box_at_obstacle, second_sheet, huge_prices, huge_grid, coarse_grid,
-        bridges_in_a_row, negative_multiplier, negative_reach, fractions_for_numbers,
+        closed_passage, box_at_obstacle, second_sheet, huge_prices, far_points, deep_goals,
+        goal_at_edge, order_left_out, bridges_in_a_row, negative_multiplier, negative_reach, fractions_for_numbers,
         infinite_target, fraction_for_target, price_of_any_pair, pair_without_the_other,
         vertex_without_the_other, set_with_base, teeth_that_meet, fewer_clusters, other_problem,
         choice_by_default_name, two_targets, margin_below_zero, endless_tree, goal_free,

@@ -19,9 +19,9 @@ from netsp.plan.random_worlds import random_world
 from netsp.plan.solve_problem import travel_graph
 from netsp.proof.certify import CertifyPolicy, certify
 from netsp.proof.cover_instance import CoverInstance
-from netsp.proof.triangulate import grid_of, triangulate
+from netsp.proof.triangulate import triangulate
 from netsp_check import Refused, check
-from netsp_check.dual_bound import Bound, Stage, read_cut
+from netsp_check.dual_bound import Bound, Stage, _allowed, is_out_of_order, read_cut
 from netsp_check.leg_bounds import LegBounds
 from netsp_check.problem_file import read_problem
 from netsp_check.proof_check import cover
@@ -96,20 +96,15 @@ def covered(problem, corners=48):
     """Return the cover of a problem within its tether, the exact travel graph, and the checker's
     vertices with the rows of the graph that have their words."""
     text = problem.to_json()
-    grid = grid_of(float(read_problem(text, 0).size))
-    proof = {
-        "grid": grid,
-        "target": None,
-        **triangulate(read_problem(text, grid), corners).to_fields(),
-    }
-    _, tree = cover(text, proof)
-    legs = LegBounds(tree)
+    exact = read_problem(text)
+    tree = cover(text, {"target": None, **triangulate(exact, corners).to_fields()})
     try:
         graph = travel_graph(problem)
     except InfeasibleError:
         assume(False)
-    instance = CoverInstance(problem, graph, tree, legs, range(len(tree.vertices)))
-    return instance, graph, 2.0**-grid
+    bound = Bound(tree, LegBounds(tree), None)
+    instance = CoverInstance(problem, graph, bound, range(len(tree.vertices)))
+    return instance, graph, 2.0**-exact.grid
 
 
 @settings(max_examples=40, deadline=None, derandomize=True)
@@ -190,13 +185,13 @@ def proof_of(triangles, box=ROOM):
     index = {}
     corners = [index.setdefault(p, len(index)) for t in triangles for p in t]
     points = [round(c * U) for p in index for c in p]
-    fields = {"grid": 32, "target": None, "points": points, "triangles": corners}
+    fields = {"target": None, "points": points, "triangles": corners}
     return fields if box is None else {**fields, "box": [v * U for v in box]}
 
 
 def test_a_ring_of_triangles_about_a_pier_is_accepted():
     """Triangles from the box to inside the pier are a cover of the free space."""
-    _, tree = cover(post_problem(), proof_of(ring()))
+    tree = cover(post_problem(), proof_of(ring()))
     assert {v.place for v in tree.vertices} == {0, 1, 2}
 
 
@@ -222,8 +217,8 @@ def test_a_hole_over_free_space_is_refused():
 def test_triangles_on_the_same_side_of_an_edge_are_refused():
     """Two triangles on the left of an edge are refused."""
     a, b, c = ring()[0]
-    refused("are on the left", [*ring(), (a, b, (c[0] + 0.5, c[1]))])
-    refused("are on the left", [*ring(), ring()[3]])
+    refused("is on the left of edge", [*ring(), (a, b, (c[0] + 0.5, c[1]))])
+    refused("is on the left of edge", [*ring(), ring()[3]])
 
 
 def test_a_second_sheet_over_a_place_cuts_no_place_off():
@@ -231,7 +226,7 @@ def test_a_second_sheet_over_a_place_cuts_no_place_off():
     first, second = ring(), ring((4.02, -1.98, 5.98, 1.98), (-4.5, -4.5, 12.5, 4.5))
     for triangles in (first + second, second + first, [*first[-2:], *second, *first[:-2]]):
         try:
-            _, tree = cover(post_problem(), proof_of(triangles))
+            tree = cover(post_problem(), proof_of(triangles))
         except Refused:
             continue
         assert {v.place for v in tree.vertices} == {0, 1, 2}
@@ -272,7 +267,7 @@ def test_a_box_beyond_the_bounds_is_refused():
     cover(post_problem(bounds=[-4, -4, 12, 4]), proof_of(ring(), None))
     cover(post_problem(bounds=[-4, -4, 12, 4]), proof_of(ring()))
     refused("beyond the bounds", ring(), bounds=[-3, -4, 12, 4])
-    refused("missing", ring(), None)
+    refused("expected one", ring(), None)
 
 
 def test_an_obstacle_that_the_box_touches_bounds_nothing():
@@ -364,11 +359,11 @@ def test_every_kind_of_cut_cuts_something_off():
     [
         (["subtour", "3", 1], "without the base"), (["subtour", "40", 1], "set of vertices"),
         (["subtour", "-2", 1], "set of vertices"), (["parity", "6", [[1, 2], [2, 3]]], "odd"),
-        (["parity", "6", [[1, 2], [2, 1], [2, 3]]], "distinct"), (["parity", "6", [[1, 1]]], "odd"),
-        (["comb", "2", [[0, 1], [2, 3], [4, 5]]], "whole clusters"),
+        (["parity", "6", [[1, 2], [2, 1], [2, 3]]], "distinct"), (["parity", "6", [[1, 1]]], "distinct"),
+        (["comb", "2", [[0, 1], [2, 3], [1, 4]]], "whole clusters"),
         (["comb", "c", [[2, 3], [2, 4], [0, 1]]], "disjoint"),
         (["comb", "6", [[1, 3], [2, 4]]], "odd"), (["comb", "6", [[1, 3]]], "three"),
-        (["comb", "6", [[1, 2], [0, 3], [4, 5]]], "partly"), (["blossom", "6", [[1, 3]]], "kind"),
+        (["comb", "6", [[1, 2], [0, 3], [4, 5]]], "partly"), (["blossom", "6", [[1, 3]]], "comb"),
     ],
 )  # fmt: skip
 def test_a_cut_without_the_conditions_of_its_lemma_is_refused(cut, message):
@@ -379,7 +374,7 @@ def test_a_cut_without_the_conditions_of_its_lemma_is_refused(cut, message):
 
 def bound_over(cluster, costs, target):
     """Return a check of duals over given costs, whose vertices are all in one triangle."""
-    problem = SimpleNamespace(cluster=sorted(set(cluster)), tether=10**9)
+    problem = SimpleNamespace(cluster=sorted(set(cluster)), tether=10**9, before=frozenset())
     vertices = [
         SimpleNamespace(place=c, node=0, reach=float(costs[0][v])) for v, c in enumerate(cluster)
     ]
@@ -497,8 +492,39 @@ def test_a_reach_that_is_too_small_is_refused():
 def test_the_price_of_a_pair_needs_a_pair_that_must_be_adjacent():
     """Prices of other pairs are refused: they would charge tours for legs that they lack."""
     stage = {"a": [0] * 4, "cuts": [], "reach": 20, "p": [[0, 2, 1000]]}
-    with pytest.raises(Refused, match="need not be adjacent"):
+    with pytest.raises(Refused, match="prices of adjacent pairs"):
         bound_over([0, 1, 2, 3], SQUARE, 40).check({"stages": [stage]}, [])
+
+
+# precedences
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_no_order_that_precedences_allow_is_excluded(data):
+    """Pairs next to each other in an order that keeps all precedences are allowed, and no subset
+    of them is out of order."""
+    clusters = data.draw(st.integers(3, 7))
+    order = data.draw(st.permutations(range(1, clusters)))
+    places = list(itertools.combinations(range(clusters - 1), 2))
+    held = data.draw(st.lists(st.sampled_from(places), max_size=5))
+    before = {(order[i], order[j]) for i, j in held}
+    for h in order:
+        before |= {(g, i) for g, a in before if a == h for b, i in before if b == h}
+    stops = [0, *order, 0]
+    pairs = [tuple(sorted(p)) for p in itertools.pairwise(stops)]
+    assert set(pairs) <= _allowed(frozenset(before), clusters)
+    some = data.draw(st.sets(st.sampled_from(pairs)))
+    assert not is_out_of_order(some, frozenset(before))
+
+
+def test_orders_that_precedences_exclude_are_noticed():
+    """A path from the base that visits a goal before what must come first, in both senses."""
+    before = frozenset({(1, 2), (2, 3), (1, 3)})
+    assert {(1, 3), (0, 2)}.isdisjoint(_allowed(before, 5))
+    assert is_out_of_order({(0, 3), (3, 4), (0, 2)}, before)
+    assert is_out_of_order({(2, 4), (3, 4), (1, 3)}, before)
+    assert not is_out_of_order({(0, 3), (3, 2)}, before)
 
 
 # attacks
