@@ -18,8 +18,9 @@ from netsp_check.triangulation import Disk, Point, turn
 Gate = tuple[Point, Point]
 """Left and right end of a segment that a path crosses."""
 
-ROUNDING = 16
-"""Tolerance: grid units that cover all rounding errors of one bound in floating point."""
+ROUNDING = 96
+"""Tolerance: grid units that cover δ, 64 units, by which a place may lie in an obstacle, and all
+rounding errors of one bound in floating point."""
 
 ROUNDS = ((8, 2), (8, 1))
 """Parts into which arcs are divided, in each round, where the path turns and elsewhere."""

@@ -89,7 +89,7 @@ def read_problem(text: str, margin: float = 0.0, slack: float = 0.0) -> Problem:
     goals = [place for k, goal in enumerate(data["goals"]) for place in _places(goal, k)]
     base, *at = (_point(p) for p in (data["base"], *(g["position"] for g in goals)))
     tether = _number(data["tether_length"]) / (1.0 + slack)
-    size = max((abs(p[i] - base[i]) for p in at for i in (0, 1)), default=Fraction(0))
+    size = max((abs(p[i] - base[i]) for p in at for i in (0, 1, 2)), default=Fraction(0))
     size = min(size or Fraction(tether), Fraction(tether))
     grid = GRID_BITS - math.frexp(size)[1]
     unit = Fraction(2) ** -grid
