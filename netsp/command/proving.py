@@ -35,6 +35,11 @@ def check_provable(args: argparse.Namespace, problem: Problem) -> None:
             f"--proof: proofs are of all tours, and --roadmap {args.roadmap} knows only some; "
             "expected --roadmap taut"
         )
+    if args.keep_order:
+        raise InputError(
+            "--proof: proofs are of tours in any order, and --keep-order gives one; expected only "
+            "one of both"
+        )
     if problem.state is not None:
         raise InputError(
             "--proof: the problem starts from a state, and proofs are of tours that start at the "
@@ -106,7 +111,7 @@ def _certificate(
     from netsp.base.interrupt_signals import until_interrupt
     from netsp.proof.certify import Certificate, certify
 
-    stopped = "interrupted"
+    stopped, aim = "interrupted", _aim(solution)
     if clock.is_up:
         reason = stopped if clock.is_stopped else "no time was left after the solve"
         return Certificate("none", reason)
@@ -114,9 +119,7 @@ def _certificate(
         with until_interrupt(clock) as rest:
             try:
                 found = rest.bounded(
-                    "proving",
-                    lambda: certify(problem, solution, time_limit=rest, on_progress=tell),
-                    winds_down=True,
+                    "proving", lambda: certify(problem, aim, time_limit=rest, on_progress=tell)
                 )
             except LimitReachedError:
                 found = Certificate("none", "time limit reached")
@@ -127,7 +130,22 @@ def _certificate(
         return Certificate("none", stopped)
     if is_stopped and found.level == "none":
         return Certificate("none", stopped)
+    if aim is not solution and found.level == "optimal":
+        return Certificate("bound", "the solver proved no more", found.bound, found.proof)
     return found
+
+
+def _aim(solution: Solution) -> Solution:
+    """Return the solution with the length that is worth proving: the solver's bound on all tours if
+    its tour is longer, because a search for a proof of the tour's length may last long in vain."""
+    from netsp.model.bound_scope import Scope
+
+    bound, length = solution.bound, solution.length
+    if bound is None or length is None or bound.scope is not Scope.ALL_TOURS:
+        return solution
+    if bound.proves(length) or bound.length <= 0.0:
+        return solution
+    return solution.model_copy(update={"length": bound.length})
 
 
 def infeasible_solution(problem: Problem, args: argparse.Namespace) -> Solution:
