@@ -59,8 +59,9 @@ docs: $(VENV)/.installed
 # the wheel that a release would have, alone in a new environment, does the main job
 wheel: wheel-installed
 	cd build/wheel && env/bin/netsp --version
-	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --quiet
-	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --quiet
+	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --proof tour.proof --quiet
+	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --proof tour.proof --quiet
+	cd build/wheel && env/bin/python -m netsp_check ../../problems/pool.json tour.json tour.proof
 
 wheel-installed: $(VENV)/.core
 	rm -rf build/wheel && mkdir -p build/wheel

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
             f"{tour:>12}  {status}"
         )
     solved = sum(c.length is not None for c in search.candidates)
-    best = "proven the best" if search.proven else "not proven the best"
+    best = "proven the best by this solver" if search.proven else "not proven the best"
     print(
         f"{len(search.candidates)} places, {sum(c.possible for c in search.candidates)} of them "
         f"possible, {solved} solved" + (f"; the first is {best}" if search.best_problem else "")

@@ -57,7 +57,7 @@ def draw_tether_curve(
     ax.set_xlim(min(low, curve.shortest - 0.04 * (high - low)), high)
     ax.set_xlabel(f"tether length ({curve.units})")
     ax.set_ylabel(f"shortest tour ({curve.units})")
-    proof = "every step proven" if curve.proven else "dashed: not proven the shortest"
+    proof = "every step proven by this solver" if curve.proven else "dashed: not proven the shortest"
     if not curve.whole:
         proof += "; time ran out before the shortest tether"
     ax.set_title(
@@ -121,7 +121,7 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None, layout: MapLayout = 
             fontsize=8,
             frameon=False,
         )
-    proof = "proven the best" if search.proven else "not proven the best"
+    proof = "proven the best by this solver" if search.proven else "not proven the best"
     if best is None:
         figure.suptitle(f"{problem.name}: no place has a tour", fontsize=11)
     else:
