@@ -36,7 +36,7 @@ class Funnel:
         self.chains: tuple[list[Point], list[Point]] = ([], [])
 
     def copy(self) -> Funnel:
-        """Return a copy that further gates can be added to; of the corners passed it has the last."""
+        """Return a copy for further gates; of the corners passed, it holds the apex only."""
         other = Funnel.__new__(Funnel)
         other.passed, other._distance = self.passed[-1:], self._distance
         other.chains = (self.chains[0].copy(), self.chains[1].copy())

@@ -85,16 +85,17 @@ class Stage:
     def __init__(
         self, data: dict[str, Any], cuts: list[Cut], cluster: Sequence[int], adjacent: set[Pair]
     ) -> None:
-        prices, self.reach = data["a"], data.get("reach", UNLIMITED)
+        prices: list[int] = data["a"]
+        self.reach: int = data.get("reach", UNLIMITED)
         used = [(cuts[k], b) for k, b in data["cuts"]]
-        self._multipliers = [b for _, b in used]
-        self._pair_prices = {(g, h): price for g, h, price in data.get("p", ())}
+        self._multipliers: list[int] = [b for _, b in used]
+        self._pair_prices: dict[Pair, int] = {(g, h): price for g, h, price in data.get("p", ())}
         numbers = [*prices, self.reach, *self._multipliers, *self._pair_prices.values()]
         if len(prices) != max(cluster) + 1 or any(type(n) is not int for n in numbers):
             raise Refused("stage: expected whole numbers, one for each cluster and cut")
         if min(self._multipliers, default=0) < 0 or not self._pair_prices.keys() <= adjacent:
             raise Refused("stage: expected multipliers of at least 0, and prices of adjacent pairs")
-        self.constant = 2 * sum(prices) + sum(self._pair_prices.values())
+        self.constant: int = 2 * sum(prices) + sum(self._pair_prices.values())
         self.constant += sum(b * cut.constant for cut, b in used)
         self.potential = [prices[c] for c in cluster]
         self._inner, self._outer = [0] * len(cluster), [0] * len(cluster)

@@ -92,10 +92,10 @@ class LegBounds:
 
 def shortest_path(start: Point, end: Point, gates: Sequence[Gate]) -> tuple[list[Point], float]:
     """Return the corners and the length of the shortest path that meets gates in order."""
-    funnel, last = Funnel(start), (None, None)
+    funnel, last = Funnel(start), (start, start)
     for gate in gates:
         for side in (LEFT, RIGHT):
-            if gate[side] != last[side]:
+            if gate is gates[0] or gate[side] != last[side]:
                 funnel.narrow(gate[side], side)
         last = gate
     funnel.narrow(end, LEFT)
@@ -106,7 +106,7 @@ def _refined(
     gates: list[Gate], arcs: list[Arc | None], touched: set[Point], parts: int, other_parts: int
 ) -> tuple[list[Gate], list[Arc | None]]:
     """Return more gates, with the arcs between; `parts` is for arcs with a touched end."""
-    more, between = gates[:1], []
+    more, between = gates[:1], list[Arc | None]()
     for gate, arc in zip(gates[1:], arcs, strict=True):
         if arc is not None:
             is_touched = arc.first in touched or arc.last in touched

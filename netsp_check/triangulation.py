@@ -118,7 +118,8 @@ class Triangulation:
         bridges: Sequence[tuple[Point, Point]],
     ) -> None:
         self.problem, self.points, self.triangles = problem, points, triangles
-        values = (*problem.heights, *(v for p in (*points, *problem.places) for v in p))
+        values: list[Fraction | int] = [*problem.heights]
+        values += [v for p in (*points, *problem.places) for v in p]
         if any(abs(v) >= MAX_COORDINATE for v in values):
             raise Refused("points: are too far from the base")
         self.left: dict[tuple[int, int], int] = {}

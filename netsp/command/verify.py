@@ -80,7 +80,9 @@ def _print_verdict(args: argparse.Namespace, verdict: Verification) -> None:
         json_output.tell(json_output.of_verdict(verdict))
     elif not args.quiet:
         print(verdict)
-        print("verified" if verdict else "NOT VERIFIED")
+        open_checks = [c.name for c in verdict.checks if not c.was_made]
+        unchecked = f"; not checked: that {', '.join(open_checks)}" if open_checks else ""
+        print(f"verified{unchecked}" if verdict else "NOT VERIFIED")
 
 
 def _with_proof(

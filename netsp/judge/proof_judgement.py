@@ -58,14 +58,15 @@ def with_proof(
         shown = check(problem.to_json(), proof)
     except Refused as error:
         return _added(verdict, Check(NAME, False, f"the proof does not hold: {error}"))
-    fault, relation = None, ""
+    fault, relation, is_shown = None, "", True
     if solution is not None:
         fault = _difference(shown, solution)
         if verdict and fault is None:
-            fault, relation = _compared(shown, problem, solution)
+            fault, relation, is_shown = _compared(shown, problem, solution)
     if fault is not None:
         return _added(verdict, Check(NAME, False, fault))
-    return _added(verdict, Check(NAME, True, f"{proven_words(shown, problem.units)}{relation}"))
+    detail = f"{proven_words(shown, problem.units)}{relation}"
+    return _added(verdict, Check(NAME, True, detail, was_made=is_shown))
 
 
 def proven_words(shown: Checked, units: str) -> str:
@@ -107,22 +108,32 @@ def _difference(shown: Checked, solution: Solution) -> str | None:
     return None
 
 
-def _compared(shown: Checked, problem: Problem, solution: Solution) -> tuple[str | None, str]:
-    """Return what is wrong with a tour that passes its checks, by a proof that holds, or None; and
-    the words that compare both."""
+def _compared(shown: Checked, problem: Problem, solution: Solution) -> tuple[str | None, str, bool]:
+    """Compare a tour that passes its checks with a proof that holds.
+
+    Returns
+    -------
+    str or None
+        What is wrong with the tour's file.
+    str
+        Words that compare both.
+    bool
+        Whether the proof shows all that the file states.
+    """
     length, units = solution.length, problem.units
     if length is None:
-        return None, ""
+        return None, "", True
     tour = f"this tour is {length:.8g} {units}"
     if shown.bound > length * (1.0 + OPTIMALITY_TOLERANCE):
-        return f"the proof says {proven_words(shown, units)}, yet {tour}", ""
+        return f"the proof says {proven_words(shown, units)}, yet {tour}", "", False
     bound = LowerBound(shown.bound, Scope.ALL_TOURS)
     if bound.proves(length):
-        return None, f"; {tour}: certified optimal"
+        return None, f"; {tour}: certified optimal", True
     above = f"{tour}, {bound.above(length)}"
     stated = solution.certified_bound
     if solution.certified == "optimal" or (stated or 0.0) > shown.bound * (1.0 + 1e-9):
         what = "optimal" if solution.certified == "optimal" else f"bound {stated:.8g} {units}"
-        return f"the file says certified: {what}, but this proof shows less: {above}", ""
+        return f"the file says certified: {what}, but this proof shows less: {above}", "", False
     stands = solution.status is Status.OPTIMAL and not solution.kept_order
-    return None, f"; {above}" + "; optimal, as its file says, is not shown" * stands
+    words = f"; {above}" + "; optimal, as its file says, is not shown" * stands
+    return None, words, not stands

@@ -215,9 +215,7 @@ class _Attempt:
             self.on_progress(f"bound {bound * 2.0**-self.exact.grid:.6g}")
 
         clock = self.clock.part(self.policy.search_share)
-        search = DualSearch(
-            instance, tour, target, clock, self.policy.search, on_round=on_round
-        )
+        search = DualSearch(instance, tour, target, clock, self.policy.search, on_round=on_round)
         try:
             return search.prove()
         finally:

@@ -57,10 +57,10 @@ class DualStage:
         if self.cuts:
             outer = np.array([c.inside for c in self.cuts])
             inner = np.array([c.inside & (cluster != c.cluster) for c in self.cuts])
-            b = np.array(self.multipliers, dtype=float)
-            potential += b @ inner
-            weighted = (b[:, None] * inner).T @ outer.astype(float)
-            both = (b[:, None] * inner).T @ inner.astype(float)
+            multipliers = np.array(self.multipliers, dtype=float)
+            potential += multipliers @ inner
+            weighted = (multipliers[:, None] * inner).T @ outer.astype(float)
+            both = (multipliers[:, None] * inner).T @ inner.astype(float)
             twice += weighted + weighted.T - both
         clusters = int(cluster.max()) + 1
         of_pair = np.zeros((clusters, clusters))
