@@ -881,10 +881,11 @@ FORGERIES: dict[str, Callable[[], tuple[str, bytes]]] = {
     f.__name__: f
     for f in (
         closed_passage, box_at_obstacle, second_sheet, huge_prices, far_points, deep_goals,
-        goal_at_edge, order_left_out, bridges_in_a_row, negative_multiplier, negative_reach, fractions_for_numbers,
-        infinite_target, fraction_for_target, price_of_any_pair, pair_without_the_other,
-        vertex_without_the_other, set_with_base, teeth_that_meet, fewer_clusters, other_problem,
-        choice_by_default_name, two_targets, margin_below_zero, endless_tree, goal_free,
+        goal_at_edge, order_left_out, bridges_in_a_row, negative_multiplier, negative_reach,
+        fractions_for_numbers, infinite_target, fraction_for_target, price_of_any_pair,
+        pair_without_the_other, vertex_without_the_other, set_with_base, teeth_that_meet,
+        fewer_clusters, other_problem, choice_by_default_name, two_targets, margin_below_zero,
+        endless_tree, goal_free,
     )
 }  # fmt: skip
 """Forged proofs by name: functions that return the text of a problem and the proof."""

@@ -359,7 +359,8 @@ def test_every_kind_of_cut_cuts_something_off():
     [
         (["subtour", "3", 1], "without the base"), (["subtour", "40", 1], "set of vertices"),
         (["subtour", "-2", 1], "set of vertices"), (["parity", "6", [[1, 2], [2, 3]]], "odd"),
-        (["parity", "6", [[1, 2], [2, 1], [2, 3]]], "distinct"), (["parity", "6", [[1, 1]]], "distinct"),
+        (["parity", "6", [[1, 2], [2, 1], [2, 3]]], "distinct"),
+        (["parity", "6", [[1, 1]]], "distinct"),
         (["comb", "2", [[0, 1], [2, 3], [1, 4]]], "whole clusters"),
         (["comb", "c", [[2, 3], [2, 4], [0, 1]]], "disjoint"),
         (["comb", "6", [[1, 3], [2, 4]]], "odd"), (["comb", "6", [[1, 3]]], "three"),
