@@ -340,6 +340,23 @@ def test_every_cut_that_is_read_holds_for_every_tour(data):
         assert sum(share(u, v) for u, v in tour) >= constant
 
 
+def test_every_comb_of_six_clusters_holds_for_every_tour():
+    """All handles with three pairs as teeth; some tour is tight, so no larger side holds."""
+    cluster = list(range(6))
+    every, slack = list(tours(cluster)), []
+    for handle in itertools.chain(*(itertools.combinations(cluster, n) for n in (3, 4, 5))):
+        inside = set(handle)
+        for ends in itertools.permutations(cluster):
+            teeth = [ends[:2], ends[2:4], ends[4:]]
+            is_first = all(t[0] < t[1] for t in teeth) and teeth == sorted(teeth)
+            if not is_first or any(set(t) <= inside or not set(t) & inside for t in teeth):
+                continue
+            cut = read_cut(["comb", f"{sum(1 << c for c in inside):x}", teeth], cluster)
+            share, constant = coefficients(cut, cluster)
+            slack += [sum(share(u, v) for u, v in tour) - constant for tour in every]
+    assert min(slack) == 0
+
+
 def test_every_kind_of_cut_cuts_something_off():
     """Each kind of cut is violated by some set of legs with two legs at each cluster."""
     cluster = [0, 1, 2, 3, 4, 5]
