@@ -32,7 +32,7 @@ PROOFS = "proofs"
 """Name of the folder of proofs beside the problems."""
 
 CertifiedLevel = Literal["optimal", "bound", "none"]
-"""What the published proof shows: that the tour is the shortest, a lower bound, or nothing."""
+"""Level of a proof: that the tour is the shortest, a lower bound, or nothing."""
 
 SAME_LENGTH_TOLERANCE = 1e-6
 """Tolerance, relative, for two lengths that count as equal."""
@@ -83,7 +83,7 @@ class Record(Model):
 
     @property
     def certified(self) -> CertifiedLevel:
-        """What the published proof shows about the tour; a check of the proof confirms it."""
+        """Level of the published proof: optimal, bound, or none; a check of the proof confirms it."""
         if self.proof is None:
             return "none"
         proves = LowerBound(self.proof.bound, Scope.ALL_TOURS).proves(self.length)
