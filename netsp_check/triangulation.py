@@ -118,9 +118,9 @@ class Triangulation:
         bridges: Sequence[tuple[Point, Point]],
     ) -> None:
         self.problem, self.points, self.triangles = problem, points, triangles
-        values: list[Fraction | int] = [*problem.heights]
-        values += [v for p in (*points, *problem.places) for v in p]
-        if any(abs(v) >= MAX_COORDINATE for v in values):
+        values = [*problem.heights, *(v for p in problem.places for v in p)]
+        whole = [v for p in points for v in p]
+        if max(map(abs, values)) >= MAX_COORDINATE or max(map(abs, whole)) >= MAX_COORDINATE:
             raise Refused("points: are too far from the base")
         self.left: dict[tuple[int, int], int] = {}
         for t, (a, b, c) in enumerate(triangles):
