@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from netsp.base.clock import Clock, TimeLimit
-from netsp.base.errors import LimitReachedError
+from netsp.base.errors import LimitReachedError, counted
 from netsp.base.number_ranges import check_not_negative
 from netsp.model.problem import Problem
 from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
@@ -185,7 +185,8 @@ class _Attempt:
                 proof[name] = getattr(self.solution, name)
         proof |= triangulate(self.exact, corners).to_fields()
         tree = cover(self.text, proof)
-        self.on_progress(f"{len(tree.vertices)} classes in {len(tree.nodes)} triangles")
+        size = f"{counted(len(tree.nodes), 'triangle')} of the cover"
+        self.on_progress(f"classes {len(tree.vertices)}, {size}")
         if len(tree.vertices) > self.policy.max_vertices:
             raise LimitReachedError(f"there are more than {self.policy.max_vertices} classes")
         legs = LegBounds(tree)
