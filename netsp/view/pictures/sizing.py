@@ -57,7 +57,9 @@ def draw_tether_curve(
     ax.set_xlim(min(low, curve.shortest - 0.04 * (high - low)), high)
     ax.set_xlabel(f"tether length ({curve.units})")
     ax.set_ylabel(f"shortest tour ({curve.units})")
-    proof = "every step proven by this solver" if curve.proven else "dashed: not proven the shortest"
+    proof = (
+        "every step proven by this solver" if curve.proven else "dashed: not proven the shortest"
+    )
     if not curve.whole:
         proof += "; time ran out before the shortest tether"
     ax.set_title(
