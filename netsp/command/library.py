@@ -45,29 +45,8 @@ def _chosen(args: argparse.Namespace, library: Library) -> list[str]:
 def _list(args: argparse.Namespace, library: Library) -> int:
     names = _chosen(args, library)
     if args.json:
-        json_output.tell(
-            {
-                "problems": [
-                    {"problem": name}
-                    | (
-                        {
-                            "length": r.length,
-                            "lower_bound": r.lower_bound,
-                            "gap": r.gap,
-                            "lower_bound_of": None if r.bound is None else r.bound.scope.value,
-                            "certified": r.certified,
-                            "certified_bound": None if r.proof is None else r.proof.bound,
-                            "solver": r.solver,
-                            "by": r.by,
-                            "date": r.date,
-                        }
-                        if (r := library.records.get(name))
-                        else {}
-                    )
-                    for name in names
-                ]
-            }
-        )
+        rows = [{"problem": name} | _fields(library.records.get(name)) for name in names]
+        json_output.tell({"problems": rows})
         return 0
     print(f"bounds are on {Scope.ALL_TOURS.tours}")
     print(
@@ -88,6 +67,23 @@ def _list(args: argparse.Namespace, library: Library) -> int:
             f"{r.solver}, {r.by}"
         )
     return 0
+
+
+def _fields(r: Record | None) -> dict[str, object]:
+    """Return what `netsp library list --json` says of a record; nothing if there is none."""
+    if r is None:
+        return {}
+    return {
+        "length": r.length,
+        "lower_bound": r.lower_bound,
+        "gap": r.gap,
+        "lower_bound_of": None if r.bound is None else r.bound.scope.value,
+        "certified": r.certified,
+        "certified_bound": None if r.proof is None else r.proof.bound,
+        "solver": r.solver,
+        "by": r.by,
+        "date": r.date,
+    }
 
 
 def _proofs(args: argparse.Namespace, library: Library) -> int:

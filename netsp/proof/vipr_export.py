@@ -122,18 +122,18 @@ class _Program(Bound):
             raise InputError("proof: precedences close a branch; VIPR's program has none")
         kinds = ("apart", "next") if "pair" in node else ("without", "at")
         pair = tuple(sorted(node.get("pair", ())))
-        some = [k for k, leg in enumerate(self._legs) if self._pair(*leg) == pair]
-        some += [x for v, x in self._number.items() if v == node.get("vertex")]
-        if not some:
+        chosen = [k for k, leg in enumerate(self._legs) if self._pair(*leg) == pair]
+        chosen += [x for v, x in self._number.items() if v == node.get("vertex")]
+        if not chosen:
             return self._close(node[kinds[0]], dead, ones)
         off, on = dict(dead), dict(dead)
-        a: Terms = dict.fromkeys(some, 1)
+        a: Terms = dict.fromkeys(chosen, 1)
         low, high = self._add("L", 0, a, "{ asm } -1"), self._add("G", 1, a, "{ asm } -1")
-        for i in some:
-            off[i] = self._derive({low: 1, **dict.fromkeys({*some} - {i}, -1)})
+        for i in chosen:
+            off[i] = self._derive({low: 1, **dict.fromkeys({*chosen} - {i}, -1)})
         if "vertex" in node:
             c = self.cluster[node["vertex"]]
-            others = {*self._members[c]} - {*some}
+            others = {*self._members[c]} - {*chosen}
             for x in others:
                 on[x] = self._derive(
                     {self._once[c]: 1, high: -1, **dict.fromkeys(others - {x}, -1)}
