@@ -165,9 +165,9 @@ def test_a_larger_bound_and_changed_numbers_are_not_derived(branched):
     lines = file.splitlines()
     derived = [k for k, x in enumerate(lines) if "{ lin" in x]
     for k in derived[:: len(derived) // 20 or 1]:
-        head, reason = lines[k].split("{")
-        name, sense, rhs, *coefs = head.split()
-        changed = " ".join([name, sense, str(int(rhs) - 1), *coefs, "{" + reason])
+        head, reason = lines[k].split(" { lin ")
+        count, row, factor, *rest = reason.split()
+        changed = " ".join([head, "{ lin", count, row, str(int(factor) + 1), *rest])
         with pytest.raises(Wrong, match="domination"):
             verified_bound("\n".join([*lines[:k], changed, *lines[k + 1 :]]))
 
