@@ -1,7 +1,7 @@
-"""`python -m netsp_check PROBLEM TOUR PROOF`: check a proof, and say what it shows of a tour.
+"""Check a proof and say what it shows of a tour: `python -m netsp_check PROBLEM TOUR PROOF`.
 
 PROBLEM is a problem file in the long form (`netsp verify PROBLEM --problem-output FILE` writes it),
-TOUR a solution file of it or - for none, and PROOF the file that `netsp solve --proof` wrote.
+TOUR its solution file, or - for none, and PROOF the file that `netsp solve --proof` wrote.
 Exit codes: 0 the proof holds, 5 it does not or contradicts the tour, 2 a file cannot be read.
 """
 
@@ -25,7 +25,7 @@ def sentences(problem: dict[str, Any], shown: Checked) -> list[str]:
     if shown.margin or shown.slack:
         out.append(f"Obstacles are grown by {shown.margin:g} {unit}; slack {shown.slack:g}.")
     if n := shown.closed_gaps:
-        out.append(f"Gaps below three billionths of the size count as closed: there are {n}.")
+        out.append(f"Gaps narrower than three billionths of the size that count as closed: {n}.")
     return out
 
 
@@ -33,9 +33,9 @@ def compared(tour: dict[str, Any], shown: Checked) -> str:
     """Return what a proof shows of a tour; raise Refused if they contradict each other."""
     for name, proven in (("margin", shown.margin), ("slack", shown.slack)):
         if (planned := tour.get(name) or 0.0) != proven:
-            raise Refused(f"it is for {name} {proven:g}, and the tour for {planned:g}")
+            raise Refused(f"it has {name} {proven:g}, but the tour has {planned:g}")
     if shown.bound > (length := float(tour["length"])) * (1.0 + TOLERANCE):
-        raise Refused(f"its bound is {shown.bound:.9g}, and the tour states {length:.9g}")
+        raise Refused(f"its bound is {shown.bound:.9g}, but the tour states {length:.9g}")
     says = f"If netsp verify accepts this tour of {length:.9g}, then it is "
     if length - shown.bound <= TOLERANCE * length:
         return says + "certified shortest, up to a millionth of its length."

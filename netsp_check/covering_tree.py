@@ -24,7 +24,7 @@ class Funnel:
     Attributes
     ----------
     passed : list of points
-        Start, and the corners that all these paths turn at; the last one is the apex.
+        Start, and the corners at which all paths turn; the last one is the apex.
     chains : pair of lists of points
         Corners from the apex, excluded, to the left and to the right end of the last gate.
     """
@@ -36,7 +36,7 @@ class Funnel:
         self.chains: tuple[list[Point], list[Point]] = ([], [])
 
     def copy(self) -> Funnel:
-        """Return a copy for further gates; of the corners passed, it holds the apex only."""
+        """Return a copy for further gates, which holds only the apex of the corners passed."""
         other = Funnel.__new__(Funnel)
         other.passed, other._distance = self.passed[-1:], self._distance
         other.chains = (self.chains[0].copy(), self.chains[1].copy())
@@ -74,7 +74,7 @@ class Funnel:
         return total
 
     def distance(self) -> float:
-        """Return a lower bound on the distance of all points of the last gate."""
+        """Return a lower bound on the distance from the start to all points of the last gate."""
         ax, ay = self.passed[-1]
         (x, y), (u, v) = ([(ax, ay), *chain][-1] for chain in self.chains)
         dx, dy, px, py = u - x, v - y, ax - x, ay - y
@@ -95,12 +95,12 @@ class Node(NamedTuple):
 
 
 class Vertex(NamedTuple):
-    """Place at a grid point of a node: a class of the tether, of planar length `reach` or more."""
+    """Place in a node: a class of the tether, of length `tether` or more in the plane."""
 
     place: int
     node: int
     at: Point
-    reach: float
+    tether: float
 
 
 class CoveringTree:
@@ -160,7 +160,7 @@ class CoveringTree:
             self.end[parent] = max(self.end[parent], self.end[k])
 
     def gates(self, u: Vertex, v: Vertex) -> list[tuple[int, int]]:
-        """Return the indices of the left and right ends of all edges between two vertices."""
+        """Return the gates between two vertices as indices of their left and right ends."""
         back, out = [], []
         a, b = u.node, v.node
         while a != b:

@@ -17,12 +17,12 @@ from netsp_check.leg_bounds import LegBounds
 from netsp_check.problem_file import Refused
 
 Pair = tuple[int, int]
-"""Two clusters or two vertices, the smaller number first."""
+"""Pair of clusters or of vertices, the lower number first."""
 
 UNLIMITED = 1 << 100
 """Sentinel: more than any cost."""
 
-SLACK = 64
+NEAR_LEG_ROUNDING = 64
 """Tolerance: grid units that cover the rounding of distances in `Bound._near_legs`."""
 
 
@@ -75,7 +75,7 @@ class Stage:
     Attributes
     ----------
     reach
-        Legs of at least this reduced cost need no exact one.
+        Reduced cost from which on legs count as this much; unlimited after the first stage.
     constant
         Lower bound if no leg had a negative reduced cost.
     potential
@@ -219,7 +219,7 @@ class Bound:
         cheapest = [2 * UNLIMITED] * self.clusters
         for v, (a, b) in lowest.items():
             cheapest[self.cluster[v]] = min(cheapest[self.cluster[v]], a + b)
-        # twice what a tour costs above the target, at least
+        # lower bound on twice the excess of a tour over the target
         excess = 2 * (stage.constant - self.target) + sum(cheapest)
         above = {v: -cheapest[self.cluster[v]] for v in alive}
         left = {v for v in alive if excess + above[v] + sum(lowest[v]) < 0}
@@ -249,7 +249,7 @@ class Bound:
         """
         nodes, end, vertices = self.tree.nodes, self.tree.end, self.tree.vertices
         at_node = [v.node for v in vertices]
-        own = [math.floor(v.reach) - p for v, p in zip(vertices, stage.potential, strict=True)]
+        own = [math.floor(v.tether) - p for v, p in zip(vertices, stage.potential, strict=True)]
         for u in sorted(alive):
             child, node, beyond = -1, vertices[u].node, 0
             while node >= 0:
@@ -260,13 +260,13 @@ class Bound:
                     branches.append((d, end[d], math.ceil(nodes[d].farthest)))
                     d = end[d]
                 for first, last, farthest in branches:
-                    limit = stage.reach + stage.potential[u] - beyond + farthest + SLACK
+                    limit = stage.reach + stage.potential[u] - beyond + farthest + NEAR_LEG_ROUNDING
                     low = max(bisect.bisect_left(at_node, first), u + 1)
                     for v in range(low, bisect.bisect_left(at_node, last)):
                         if own[v] < limit and v in alive and self._pair(u, v) in self.allowed:
                             yield u, v
                 child, node = node, nodes[node].parent
-                beyond = math.floor(vertices[u].reach - nodes[child].farthest)
+                beyond = math.floor(vertices[u].tether - nodes[child].farthest)
 
 
 def _allowed(before: frozenset[Pair], clusters: int) -> set[Pair]:
@@ -307,7 +307,7 @@ def _conflicts(rank: dict[int, int], before: frozenset[Pair], has_base: bool, se
     for a, b in before:
         if has_base:
             # visits at the front, then those elsewhere, then those at the back
-            p, q = (_place(sense * rank.get(c, 0)) for c in (a, b))
+            p, q = (_visit_order(sense * rank.get(c, 0)) for c in (a, b))
         elif a in rank and b in rank:
             p, q = (float(sense * rank[c]) for c in (a, b))
         else:
@@ -317,13 +317,13 @@ def _conflicts(rank: dict[int, int], before: frozenset[Pair], has_base: bool, se
     return False
 
 
-def _place(rank: int) -> float:
+def _visit_order(rank: int) -> float:
     """Return a number that orders visits: 1, 2, … come first, -2, -1 last, 0 in between."""
     return -1.0 / rank if rank else 0.0
 
 
 def bits(mask: int) -> Iterator[int]:
-    """Yield the places of the ones of a number."""
+    """Yield the positions of the one bits of a number."""
     while mask:
         low = mask & -mask
         yield low.bit_length() - 1

@@ -1,7 +1,7 @@
 """Lower bounds on the lengths of legs, in whole grid units (Lemmas 7 and 8).
 
-The shortest path through the edges between two vertices is a lower bound. Gates that end on an arc,
-added where that path turns, raise it towards the length of tangents and arcs. Floating-point
+The shortest path through the gates between two vertices is a lower bound. More gates, which end on
+arcs where that path turns, raise the bound towards the length of tangents and arcs. Floating-point
 numbers are used with +, -, *, / and sqrt only, which IEEE 754 rounds correctly.
 """
 
@@ -39,7 +39,7 @@ class Arc(NamedTuple):
 class LegBounds:
     """Lower bounds on the lengths of legs between vertices of a cover, by effort.
 
-    Effort 0 is the straight line, 1 the path among triangles, 2 the one with more gates at arcs.
+    Effort 0 is the straight line, 1 the path through all gates, 2 the path with more gates at arcs.
     """
 
     def __init__(self, tree: CoveringTree) -> None:
@@ -128,8 +128,8 @@ def _on_arc(arc: Arc, parts: int) -> list[Point]:
         u, v = a + (c - a) * k / parts, b + (d - b) * k / parts
         norm = math.sqrt(u * u + v * v)
         if norm > 0.5 * radius:
-            reach = (radius - 4.0) / norm  # rounding keeps the point in the disk
-            p = round(x + u * reach), round(y + v * reach)
+            scale = (radius - 4.0) / norm  # rounding keeps the point in the disk
+            p = round(x + u * scale), round(y + v * scale)
             sign = 1 - 2 * arc.side
             sides = turn(last, arc.apex, p), turn(arc.apex, arc.last, p), turn(arc.last, last, p)
             if min(sign * s for s in sides) > 0:

@@ -27,7 +27,7 @@ FIELDS = {
 
 
 class Refused(Exception):
-    """A file is not understood, or a proof does not hold; the message says why."""
+    """Refusal of a file that is not understood, or of a proof that does not hold; says why."""
 
 
 class Obstacle(NamedTuple):
@@ -45,9 +45,9 @@ class Obstacle(NamedTuple):
 class Problem(NamedTuple):
     """Problem in grid units from the base; the numbers of the file are taken exactly.
 
-    `places` and `heights` are those of the base, then of the goals; `cluster` numbers what each
-    place serves: 0 is the base, and goals of one choice share a number. `before` holds the pairs of
-    clusters of which the first is visited before the second. A grid unit is 2^-grid units of the
+    `places` and `heights` are those of the base, then of the goals. `cluster` holds the cluster of
+    each place: 0 for the base; goals of one choice share one. `before` holds the pairs of clusters
+    of which the first is visited before the second. A grid unit is 2^-grid units of the
     file.
     """
 

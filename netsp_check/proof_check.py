@@ -20,7 +20,7 @@ MAX_BYTES = 1 << 26
 
 
 class Checked(NamedTuple):
-    """What a proof shows: no tour of the problem is shorter than `bound`, inf if there is none.
+    """Claim that a proof shows: no tour is shorter than `bound`, which is inf if there is no tour.
 
     The tour keeps `margin` more clearance than the problem asks for, and a share `slack` of its
     tether's length in reserve. Of the gaps between obstacles, `closed_gaps` that are narrower than

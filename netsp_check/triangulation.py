@@ -41,7 +41,7 @@ class Piece(NamedTuple):
 
 
 class Border:
-    """Region in which edges without a neighbour must lie: obstacles, bridges, outside the box."""
+    """Region that must hold all border edges: obstacles, bridges, and outside the box."""
 
     def __init__(
         self, problem: Problem, box: list[int] | None, bridges: Sequence[tuple[Point, Point]]
@@ -106,7 +106,7 @@ class Triangulation:
     left : dict
         Triangle on the left of each directed edge (a, b).
     disks : dict
-        Disk that holds both ends of a directed edge (a, b) without a triangle on its right.
+        Disk that holds both ends of a border edge (a, b), which has no triangle on its right.
     """
 
     def __init__(
@@ -156,7 +156,7 @@ class Triangulation:
             raise Refused(f"point {min(closed)[0]}: triangles surround it")
 
     def _check_border(self, border: Border) -> None:
-        """Check that edges without a neighbour are in obstacles, δ away from all places."""
+        """Check that border edges are within the border, and δ away from all places."""
         near = 2.0 * float(border.delta)
         places = [(p, float(p[0]), float(p[1])) for p in self.problem.places]
         for a, b in self.left:
@@ -218,10 +218,10 @@ def _distance2(p: Exact, a: Exact, b: Exact) -> Fraction:
 
 def _frame(piece: Piece) -> tuple[float, float, float, float]:
     """Return a box (x0, y0, x1, y1) that holds a piece, despite rounding."""
-    reach = float(piece.radius) * (1.0 + 1e-6) + 1.0
+    room = float(piece.radius) * (1.0 + 1e-6) + 1.0
     x0, x1 = sorted((float(piece.a[0]), float(piece.b[0])))
     y0, y1 = sorted((float(piece.a[1]), float(piece.b[1])))
-    return x0 - reach, y0 - reach, x1 + reach, y1 + reach
+    return x0 - room, y0 - room, x1 + room, y1 + room
 
 
 def _edges(corners: Sequence[Exact]) -> list[tuple[Exact, Exact]]:

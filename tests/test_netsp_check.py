@@ -394,7 +394,7 @@ def bound_over(cluster, costs, target):
     """Return a check of duals over given costs, whose vertices are all in one triangle."""
     problem = SimpleNamespace(cluster=sorted(set(cluster)), tether=10**9, before=frozenset())
     vertices = [
-        SimpleNamespace(place=c, node=0, reach=float(costs[0][v])) for v, c in enumerate(cluster)
+        SimpleNamespace(place=c, node=0, tether=float(costs[0][v])) for v, c in enumerate(cluster)
     ]
     node = SimpleNamespace(parent=-1, farthest=0.0)
     tree = SimpleNamespace(
