@@ -231,6 +231,8 @@ class Bound:
                 other = sum(lowest[w][1 if r <= lowest[w][0] else 0] for w in (u, v))
                 if excess + above[u] + above[v] + 2 * r + other < 0:
                     kept.add((u, v))
+        if kept == legs and left == alive:
+            raise Refused("stage: strikes out nothing")
         return left, kept
 
     def _price(self, stage: Stage, u: int, v: int) -> int:

@@ -15,8 +15,11 @@ Disk = tuple[float, float, float]
 """Centre (x, y) and radius."""
 
 RESOLUTION = 2**30
-"""Tolerance: δ is the size of the problem divided by this. Gaps between obstacles up to 3 δ wide
-may count as closed, and a place may lie in an obstacle by less than δ."""
+"""Tolerance: δ is the size of the problem divided by this. Gaps between obstacles up to δ wide may
+count as closed, and a place may lie in an obstacle by less than δ."""
+
+BRIDGE_RADIUS = Fraction(4)
+"""Tolerance: grid units on both sides of a bridge that count as obstacle; its corners are whole."""
 
 MAX_HALVINGS = 8
 """Format limit: how often an edge is halved until one piece of an obstacle holds each part."""
@@ -47,7 +50,7 @@ class Border:
         self, problem: Problem, box: list[int] | None, bridges: Sequence[tuple[Point, Point]]
     ) -> None:
         self.delta = problem.size / RESOLUTION
-        usable = _usable(problem, box, self.delta)
+        self._usable = usable = _usable(problem, box, self.delta)
         self._box = box if box is not None else problem.bounds
         self._polygons = [o.corners for o in usable if len(o.corners) > 1]
         grown = [o for o in usable if o.growth > 0]
@@ -79,14 +82,22 @@ class Border:
         first, last = exact(a), exact(b)
         if _distance2(first, last, last) > self.delta**2:
             raise Refused(f"bridge {a}, {b}: expected a length of at most δ")
-        for p in (first, last):
-            is_held = any(q.holds(p) for q, _ in self._framed)
-            is_held = is_held or any(_is_inside(c, p, p) for c in self._polygons)
-            if not is_held and not (has_bounds and self._is_outside(p, p)):
-                raise Refused(f"bridge {a}, {b}: expected both ends in obstacles")
+        held = [self._holders(p, has_bounds) for p in (first, last)]
+        if not all(held) or len(held[0] | held[1]) < 2:
+            raise Refused(f"bridge {a}, {b}: expected its ends in different obstacles")
         if any(_distance2(p, first, last) < (2 * self.delta) ** 2 for p in problem.places):
             raise Refused(f"bridge {a}, {b}: expected 2 δ to the base and all goals")
-        return Piece(first, last, self.delta)
+        return Piece(first, last, BRIDGE_RADIUS)
+
+    def _holders(self, p: Exact, has_bounds: bool) -> set[int]:
+        """Return the obstacles that hold a point, and -1 if it is outside the bounds."""
+        owners = {-1} if has_bounds and self._is_outside(p, p) else set()
+        for k, o in enumerate(self._usable):
+            pieces = [Piece(c, c, o.growth) for c in o.corners] if o.growth > 0 else []
+            pieces += [Piece(*edge, o.growth) for edge in _edges(o.corners) if o.growth > 0]
+            if any(q.holds(p) for q in pieces) or _is_inside(o.corners, p, p):
+                owners.add(k)
+        return owners
 
     def _is_outside(self, a: Exact, b: Exact) -> bool:
         """Return whether an edge is outside the box, or on its border."""

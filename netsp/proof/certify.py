@@ -175,8 +175,10 @@ class _Attempt:
             return Certificate("none", reason)
         try:
             return self._certificate(int(self.root_bound * (1.0 - TARGET_SHARE)), corners, reason)
-        except (LimitReachedError, ShorterTourError, Refused) as error:
+        except (LimitReachedError, Refused) as error:
             return Certificate("none", str(error))
+        except ShorterTourError:
+            return Certificate("none", reason)
 
     def _certificate(self, target: int | None, corners: int, reason: str) -> Certificate:
         proof: dict[str, Any] = {"format": "netsp-proof 1", "target": target}

@@ -316,7 +316,10 @@ class DualSearch:
         pairs = dict.fromkeys(adjacent, round(self._charge))
         struck = self._add_stage(node, _stage(point.duals, self.lp.cuts, pairs), vertices, legs)
         u, v = self.lp.legs.T
-        return struck.vertices, alive & struck.legs[u, v]
+        left = alive & struck.legs[u, v]
+        if left.any() and left.sum() == alive.sum():
+            node.stages.pop()  # it strikes out nothing, which the checker refuses
+        return struck.vertices, left
 
     def _settle(self, stage: DualStage, vertices: Bools, legs: Bools) -> bool:
         """Settle the costs of all legs within the reach of a stage, and return whether one fell

@@ -13,6 +13,9 @@ from netsp.base.arrays import Floats
 from netsp_check.problem_file import Obstacle, Problem
 from netsp_check.triangulation import RESOLUTION
 
+SLIVER = 2.5
+"""Tolerance: half the width of the strip that closes a gap, in grid units; rounding may add 1."""
+
 INSET = 4.0
 """Tolerance: grid units by which polygons stay inside obstacles, despite rounding."""
 
@@ -66,7 +69,7 @@ def triangulate(problem: Problem, corners: int) -> Mesh:
         assert problem.bounds is not None
         shapes += _walls([float(v) for v in problem.bounds])
     bridges = _bridges(shapes, delta)
-    slivers = [shapely.LineString(np.reshape(b, (2, 2))).buffer(0.5 * delta, 1) for b in bridges]
+    slivers = [shapely.LineString(np.reshape(b, (2, 2))).buffer(SLIVER, 1) for b in bridges]
     solid = shapely.union_all([*shapes, *slivers], grid_size=1.0)
     places = [shapely.Point(round(x), round(y)) for x, y in problem.places]
     holes = shapely.union_all([p.buffer(2.0 * delta, 2) for p in places], grid_size=1.0)
