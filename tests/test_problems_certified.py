@@ -41,6 +41,14 @@ def test_every_shipped_problem_is_certified(path):
     assert uncertified(Problem.load(path)) == ""
 
 
+def test_goals_on_rays_of_obstacles_are_certified():
+    """Viewpoints straight above a pile are on its ray, where a rounded position changes words."""
+    goals = [{"inspect": "pile", "standoff": 0.5, "viewpoints": 3}, [9.0, 1.0]]
+    pile = {"center": [7.2, 2.2], "radius": 0.25, "name": "pile"}
+    data = {"base": [0.5, 3.0], "goals": goals, "obstacles": [pile], "tether_length": 14.0}
+    assert uncertified(Problem.model_validate({"schema_version": 1, **data})) == ""
+
+
 @pytest.mark.parametrize("portion", range(PORTIONS))
 def test_every_optimum_of_a_random_problem_is_certified(portion):
     """`netsp_check` accepts a proof of each optimum of 200 random problems of five families."""

@@ -82,6 +82,8 @@ class CoverInstance:
         gates = [(points[a], points[b]) for a, b in tree.gates(start, end)]
         path, _ = shortest_path(start.at, end.at, gates)
         xy = np.array(path, dtype=float) * scale + np.array(problem.base[:2])
+        # on a ray, as beside a structure to inspect, the side depends on the last bit
+        xy[[0, -1]] = [problem.points[v.place, :2] for v in (start, end)]
         return signature(xy, problem.representative_points)
 
     def _estimates(self, graph: TravelGraph, check: Callable[[], None]) -> Floats:
