@@ -34,6 +34,8 @@ def compared(tour: dict[str, Any], shown: Checked) -> str:
     for name, proven in (("margin", shown.margin), ("slack", shown.slack)):
         if (planned := tour.get(name) or 0.0) != proven:
             raise Refused(f"it has {name} {proven:g}, but the tour has {planned:g}")
+    if tour.get("length") is None:
+        return "The solution file states no length, so the proof shows nothing of its tour."
     if shown.bound > (length := float(tour["length"])) * (1.0 + TOLERANCE):
         raise Refused(f"its bound is {shown.bound:.9g}, but the tour states {length:.9g}")
     says = f"If netsp verify accepts this tour of {length:.9g}, then it is "
@@ -57,7 +59,7 @@ def main(words: list[str]) -> int:
             return 2
     try:
         shown = check(json.dumps(objects[0]), files[2])
-        tours = [tour for tour in objects[1:] if tour.get("length") is not None]
+        tours = [tour for tour in objects[1:] if tour]
         lines = sentences(objects[0], shown) + [compared(tour, shown) for tour in tours]
     except (Refused, KeyError, TypeError, ValueError) as error:
         print(f"NOT PROVEN: the proof is refused: {error}")

@@ -106,6 +106,8 @@ def read_problem(text: str, margin: float = 0.0, slack: float = 0.0) -> Problem:
         corners = tuple(exact(p) for p in (o["polygon"] if "polygon" in o else [o["center"]]))
         obstacles.append(Obstacle(corners, growth / unit))
     box = data.get("bounds")
+    if box is not None and (len(box) != 4 or any(isinstance(v, list) for v in box)):
+        raise Refused("bounds: expected [xmin, ymin, xmax, ymax]; an outline is a short form")
     clusters = _clusters(goals)
     return Problem(
         grid=grid,

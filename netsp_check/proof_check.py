@@ -90,7 +90,11 @@ def check(problem_text: str, proof_data: bytes) -> Checked:
         bound.check(proof["tree"], proof.get("cuts", []))
     except Refused:
         raise
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except KeyError as error:
+        raise Refused(f"a file is damaged: {error} is missing") from None
+    except ValueError as error:
+        raise Refused(f"a file is damaged: {error}") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
         raise Refused(f"a file is damaged: {type(error).__name__}: {error}") from None
     except (MemoryError, RecursionError, zlib.error) as error:
         raise Refused(f"the proof cannot be read: {type(error).__name__}") from None

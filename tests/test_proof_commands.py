@@ -41,7 +41,7 @@ def edited(tour, file, **fields):
 
 def last_check(capsys):
     """Return the line of the check that no tour is shorter."""
-    lines = [s for s in capsys.readouterr().out.splitlines() if "no tour is shorter" in s]
+    lines = [s for s in capsys.readouterr().out.splitlines() if "no tour is shorter  " in s]
     assert len(lines) == 1
     return lines[0]
 
@@ -67,7 +67,7 @@ def test_a_proof_certifies_the_tour_in_the_file_and_by_both_commands(pool, capsy
     assert main(["verify", POOL, tour, "--proof", proof]) == 0
     line = last_check(capsys)
     assert line.startswith("ok")
-    assert "certified optimal" in line
+    assert "certified shortest" in line
     assert check_main([POOL, tour, proof]) == 0
     assert "is certified shortest" in capsys.readouterr().out
     assert main(["verify", POOL, "--proof", proof]) == 0  # without a tour
@@ -240,6 +240,7 @@ def test_an_interrupted_proof_leaves_the_solution(number, tmp_path):
         (["--roadmap", "prm"], "expected --roadmap taut"),
         (["--keep-order"], "--keep-order"),
         (["--proof", "-"], "expected the name of a file"),
+        (["--proof", ""], "expected the name of a file"),
     ],
 )
 def test_proofs_that_can_never_be_are_refused_before_the_work(words, says, tmp_path, capsys):
@@ -287,6 +288,21 @@ def test_the_checker_refuses_unreadable_files_in_one_line(pool, tmp_path, capsys
         assert err.count("\n") == 1
         assert "cannot be read" in err
     assert check_main([]) == 2
+
+
+def test_the_checker_says_when_a_file_is_of_another_kind(pool, tmp_path, capsys):
+    tour, proof = pool
+    assert check_main([POOL, POOL, proof]) == 0
+    assert "states no length" in capsys.readouterr().out
+    outline = tmp_path / "outline.json"
+    corners = [[0, 0], [12.5, 0], [12.5, 6], [0, 6]]
+    outline.write_text(json.dumps(json.loads(Path(POOL).read_text()) | {"bounds": corners}))
+    assert check_main([str(outline), tour, proof]) == 5
+    assert "an outline is a short form" in capsys.readouterr().out
+    lacking = tmp_path / "lacking.proof"
+    lacking.write_text('{"format": "netsp-proof 1"}')
+    assert check_main([POOL, tour, str(lacking)]) == 5
+    assert "damaged: 'target' is missing" in capsys.readouterr().out
 
 
 def test_the_checker_runs_without_netsp_and_its_packages(pool):

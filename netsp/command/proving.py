@@ -28,8 +28,9 @@ def check_provable(args: argparse.Namespace, problem: Problem) -> None:
         )
     if args.proof is None:
         return
-    if args.proof == STANDARD:
-        raise InputError("--proof: expected the name of a file, got - (standard output)")
+    if args.proof in (STANDARD, ""):
+        got = "- (standard output)" if args.proof else "an empty one"
+        raise InputError(f"--proof: expected the name of a file, got {got}")
     if args.roadmap not in EXACT_ROADMAPS:
         raise InputError(
             f"--proof: proofs are of all tours, and --roadmap {args.roadmap} knows only some; "

@@ -128,7 +128,7 @@ def _compared(shown: Checked, problem: Problem, solution: Solution) -> tuple[str
         return f"the proof says {proven_words(shown, units)}, yet {tour}", "", False
     bound = LowerBound(shown.bound, Scope.ALL_TOURS)
     if bound.proves(length):
-        return None, f"; {tour}: certified optimal", True
+        return None, f"; {tour}: certified shortest", True
     above = f"{tour}, {bound.above(length)}"
     stated = solution.certified_bound
     if solution.certified == "optimal" or (stated or 0.0) > shown.bound * (1.0 + 1e-9):

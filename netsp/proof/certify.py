@@ -130,8 +130,10 @@ def _obstruction(problem: Problem, solution: Solution) -> str:
         return f"proofs need the roadmap taut; this is {solution.roadmap}"
     if solution.status is Status.INFEASIBLE:
         return ""
-    if solution.length is None or solution.status is Status.INVALID:
-        return "there is no tour for a tether"
+    if solution.status is Status.INVALID:
+        return "the solver ignores the tether; expected another solver"
+    if solution.length is None:
+        return "no tour was found"
     return ""
 
 

@@ -175,7 +175,7 @@ class DualSearch:
             point = self._price_and_cut(lp, legs)
             self.root_bound = point.objective
             if point.objective < self.target * (1.0 - self.policy.max_root_gap):
-                raise LimitReachedError("the bound of the root is far below the tour")
+                raise LimitReachedError("the tour is far longer than the bound; allow more time")
             stage = _stage(point.duals, lp.cuts, {})
             if not self._settle(stage, vertices, legs):
                 break
