@@ -475,5 +475,7 @@ def test_words_of_a_proof_for_each_status():
     assert kept == f"{Status.OPTIMAL_OF_KEPT.verdict}; at most 25 % above the shortest tour"
     assert proof(Status.OPTIMAL, 8.0, bound) == "proven shortest by this solver"
     in_order = LowerBound(8.0, Scope.GIVEN_ORDER)
-    assert proof(Status.OPTIMAL, 8.0, in_order) == "proven shortest by this solver, in the given order"
+    assert (
+        proof(Status.OPTIMAL, 8.0, in_order) == "proven shortest by this solver, in the given order"
+    )
     assert "blind" in proof(Status.INVALID, 8.0, None)

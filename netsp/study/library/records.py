@@ -83,7 +83,7 @@ class Record(Model):
 
     @property
     def certified(self) -> CertifiedLevel:
-        """Level of the published proof: optimal, bound, or none; a check of the proof confirms it."""
+        """Level of the published proof: optimal, bound, or none; checking it confirms this."""
         if self.proof is None:
             return "none"
         proves = LowerBound(self.proof.bound, Scope.ALL_TOURS).proves(self.length)
