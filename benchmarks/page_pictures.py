@@ -141,7 +141,7 @@ def wharf(target: Path) -> None:
 
 
 def proof(target: Path) -> None:
-    """The triangles of the proof for the wharf, beneath its shortest tour."""
+    """Draw the triangles of the proof for the wharf, beneath its shortest tour."""
     import numpy as np
     from matplotlib.figure import Figure
 
@@ -149,6 +149,7 @@ def proof(target: Path) -> None:
     from netsp.proof.certify import certify
     from netsp.view.pictures import style
     from netsp.view.pictures.problem_picture import draw_map
+    from netsp_check.problem_file import read_problem
     from netsp_check.proof_check import read_proof
 
     problem = Problem.load(ROOT / "problems/wharf.json")
@@ -156,7 +157,8 @@ def proof(target: Path) -> None:
     certificate = certify(problem, solution)
     assert certificate.proof is not None
     fields = read_proof(certificate.proof)
-    points = np.reshape(fields["points"], (-1, 2)) * 2.0 ** -fields["grid"] + problem.base[:2]
+    unit = 2.0 ** -read_problem(problem.to_json()).grid
+    points = np.reshape(fields["points"], (-1, 2)) * unit + problem.base[:2]
     triangles = np.reshape(fields["triangles"], (-1, 3))
     figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     ax = figure.subplots()

@@ -343,7 +343,7 @@ def test_a_proof_about_grown_obstacles_is_no_proof_about_the_problem(small):
     grown = solve(problem, margin=0.01)
     certificate = certify(problem, grown)
     assert certificate.level == "optimal"
-    with pytest.raises(VerificationError, match=r"margin is 0\.01; expected 0"):
+    with pytest.raises(VerificationError, match=r"for margin 0\.01; expected margin 0"):
         Library(small).checked_proof(SMALL, certificate.proof)
 
 

@@ -1,5 +1,5 @@
-"""What `netsp_check` accepts is true: laws against brute force, exact legs, enumeration of tours,
-hand-made triangulations, mutated proofs and forgeries."""
+"""Soundness of `netsp_check`: laws against brute force, exact legs, enumeration of tours, hand-made
+triangulations, mutated proofs and forgeries."""
 
 import itertools
 import json
@@ -222,7 +222,7 @@ def test_triangles_on_the_same_side_of_an_edge_are_refused():
 
 
 def test_a_second_sheet_over_a_place_cuts_no_place_off():
-    """Triangles that lie over each other are refused, or both are looked for places in."""
+    """Triangles that overlap are refused, or a place counts in each of them."""
     first, second = ring(), ring((4.02, -1.98, 5.98, 1.98), (-4.5, -4.5, 12.5, 4.5))
     for triangles in (first + second, second + first, [*first[-2:], *second, *first[:-2]]):
         try:
@@ -242,14 +242,14 @@ def test_a_corner_that_triangles_surround_is_refused():
 
 
 def test_an_edge_through_free_water_is_refused():
-    """A border beyond the pier's outline is refused, however little it is beyond."""
+    """A border edge beyond the pier's outline is refused, even if it is a millionth beyond."""
     cover(post_problem(), proof_of(ring((4 + 1e-9, -2 + 1e-9, 6 - 1e-9, 2 - 1e-9))))
     for inner in ((3.999999, -1, 5, 1), (4.5, -1, 6.000001, 1), (4, -2, 6, 2)):
         refused("not in an obstacle", ring(inner))
 
 
 def test_a_border_on_the_edge_of_a_polygon_is_refused_unless_it_is_grown():
-    """The outline of a polygon without clearance is where tethers may lie."""
+    """A border edge on the outline of a polygon is refused, for tethers may lie there."""
     refused("not in an obstacle", ring((4, -1, 5, 1)))
     cover(post_problem(clearance=0.125), proof_of(ring((4, -2, 6, 2))))
     cover(post_problem(clearance=0.125), proof_of(ring((3.9, -2, 6, 2))))
@@ -490,7 +490,7 @@ SQUARE = [[0, 10, 14, 10], [10, 0, 10, 14], [14, 10, 0, 10], [10, 14, 10, 0]]
 
 
 def test_duals_of_a_tour_that_is_tight_prove_its_length():
-    """The law above does not hold because everything is refused."""
+    """A stage whose bound is the length of the shortest tour proves that length, and no more."""
     stage = {"stages": [{"a": [5] * 4, "cuts": [], "reach": 20}]}
     bound = bound_over([0, 1, 2, 3], SQUARE, 40)
     bound.check(stage, [])
@@ -500,7 +500,7 @@ def test_duals_of_a_tour_that_is_tight_prove_its_length():
 
 
 def test_a_reach_that_is_too_small_is_refused():
-    """Legs beyond the reach count as the reach, so the bound may be too low to leave them out."""
+    """A stage is refused if legs beyond its reach, which count as the reach, are not struck out."""
     for reach in (-1, -1000):
         stage = {"stages": [{"a": [5] * 4, "cuts": [], "reach": reach}]}
         with pytest.raises(Refused, match="reach is too small"):
@@ -508,7 +508,7 @@ def test_a_reach_that_is_too_small_is_refused():
 
 
 def test_the_price_of_a_pair_needs_a_pair_that_must_be_adjacent():
-    """Prices of other pairs are refused: they would charge tours for legs that they lack."""
+    """Prices of other pairs are refused: the bound would count legs that tours lack."""
     stage = {"a": [0] * 4, "cuts": [], "reach": 20, "p": [[0, 2, 1000]]}
     with pytest.raises(Refused, match="prices of adjacent pairs"):
         bound_over([0, 1, 2, 3], SQUARE, 40).check({"stages": [stage]}, [])

@@ -115,7 +115,7 @@ FOR_PROBLEMS = (
     ),
     Output(
         "--proof-vipr FILE",
-        "with --proof: also write the last program of the proof in the format of VIPR, whose "
+        "with --proof: also write the integer program of the proof in the format of VIPR, whose "
         "checker then derives the bound from it",
     ),
     Option(
@@ -848,7 +848,7 @@ LIBRARY = Command(
         default="*",
     ),
     Option("--keep", "check: write better tours, and the bound of --proof, to the records"),
-    Input("--proof FILE", "check: the proof of a bound, of `netsp solve --proof`"),
+    Input("--proof FILE", "check: proof file of a bound, written by `netsp solve --proof`"),
     Option("--by NAME", "check: name of the finder, for the records", default="a contributor"),
     OneOf(
         (

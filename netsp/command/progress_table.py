@@ -78,7 +78,7 @@ class ProgressTable:
     def tell(self, stage: str, text: str) -> None:
         """Print a line about work that has no tour and bound of its own, such as a proof.
 
-        A line that begins like the last one is held back until a row is due.
+        A line that begins with the same word as the last one is left out until a row is due.
         """
         self.end()
         now, subject = time.monotonic(), (stage, text.partition(" ")[0])
@@ -166,8 +166,8 @@ def summary(
         lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
     if solution.legs_left_out:
         lines.insert(1, _left_out(problem, solution, policy.max_named_legs))
-    if told := proof_line(problem, solution, proof):
-        lines.insert(len(lines) - 1, told)
+    if about_proof := proof_line(problem, solution, proof):
+        lines.insert(len(lines) - 1, about_proof)
     if output:
         lines.append(f"solution {output}")
     if picture:

@@ -70,7 +70,7 @@ def with_proof(
     tell : callable
         Called with a line of progress.
     vipr_file : str, optional
-        Name of a file for VIPR, which derives the proof's bound from its program.
+        Name of the file for VIPR, which derives the bound from the integer program of the proof.
     """
     from netsp.base.files import write_bytes
     from netsp.base.interrupt_signals import deferred_interrupts
@@ -137,8 +137,8 @@ def _certificate(
 
 
 def _aim(solution: Solution) -> Solution:
-    """Return the solution with the length that is worth proving: the solver's bound on all tours if
-    its tour is longer, because a search for a proof of the tour's length may last long in vain."""
+    """Return the solution with the length to prove: the solver's bound on all tours if its tour is
+    longer, because the search for a proof of the tour's length may fail after a long time."""
     from netsp.model.bound_scope import Scope
 
     bound, length = solution.bound, solution.length

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
         if table:
             table.tell("proof", text)
 
-    # with a proof to come, Ctrl-C during the solve also means that none is wanted
+    # Ctrl-C during the solve also cancels the proof
     solving = until_interrupt(clock) if args.proof else contextlib.nullcontext(clock)
     with table or contextlib.nullcontext():
         if table:
@@ -137,7 +137,7 @@ def _proven(
     from netsp.base.files import STANDARD
 
     if args.output not in (None, STANDARD):
-        _write(args, solution)  # kept even if the process is killed while it proves
+        _write(args, solution)  # the file is kept if the process is killed during the proof
     if is_interrupted:
         clock.end()
     try:
@@ -148,7 +148,7 @@ def _proven(
 
 
 def _write(args: argparse.Namespace, solution: Solution) -> None:
-    """Write the solution, whatever comes."""
+    """Write the solution; Ctrl-C waits until the file is written."""
     from netsp.base.files import STANDARD, write_text
     from netsp.base.interrupt_signals import deferred_interrupts
 

@@ -103,7 +103,7 @@ def _with_proof(
 
 
 def _proof_alone(args: argparse.Namespace) -> int:
-    """Check a proof without a tour; without a proof, only the problem was wanted."""
+    """Check a proof without a tour and return the exit code; do nothing if no proof is given."""
     from netsp.judge import Verification
     from netsp.model.problem import Problem
 

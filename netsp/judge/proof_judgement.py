@@ -1,4 +1,4 @@
-"""Judgement of the claim that no tour is shorter, by a proof file (`netsp_check`).
+"""Judgement of the claim that no tour is shorter, by a proof file that `netsp_check` checks.
 
 The other checks of a solution measure its tour. A lower bound cannot be measured: without a proof
 it is only stated, and the judge says so.
@@ -16,7 +16,7 @@ from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
 from netsp_check import Checked, Refused, check
 
 NAME = "no tour is shorter"
-"""Name of the check."""
+"""Name of the check of a lower bound, as a verdict prints it."""
 
 
 def with_claim(verdict: Verification, solution: Solution) -> Verification:
@@ -34,10 +34,11 @@ def with_claim(verdict: Verification, solution: Solution) -> Verification:
     claim = _claim(solution)
     if claim is None:
         return verdict
-    way = "give its proof (netsp verify --proof FILE)"
+    advice = "give its proof (netsp verify --proof FILE)"
     if solution.roadmap not in EXACT_ROADMAPS:
-        way = f"proofs are of all tours, and roadmap {solution.roadmap} knows only some"
-    return _added(verdict, Check(NAME, True, f"says {claim}; not checked: {way}", was_made=False))
+        advice = f"proofs are of all tours, and roadmap {solution.roadmap} knows only some"
+    detail = f"says {claim}; not checked: {advice}"
+    return _added(verdict, Check(NAME, True, detail, was_made=False))
 
 
 def with_proof(
@@ -82,7 +83,7 @@ def proven_words(shown: Checked, units: str) -> str:
         parts.append(f"{100.0 * shown.slack:g} % slack")
     if shown.closed_gaps:
         gaps = counted(shown.closed_gaps, "gap")
-        parts.append(f"{gaps} narrower than three billionths of the size taken as closed")
+        parts.append(f"{gaps} narrower than three billionths of the problem's size count as closed")
     return ", ".join(parts)
 
 
@@ -114,11 +115,11 @@ def _compared(shown: Checked, problem: Problem, solution: Solution) -> tuple[str
     Returns
     -------
     str or None
-        What is wrong with the tour's file.
+        Fault of the tour's file; None if there is none.
     str
         Words that compare both.
     bool
-        Whether the proof shows all that the file states.
+        True if the proof shows all that the file states.
     """
     length, units = solution.length, problem.units
     if length is None:

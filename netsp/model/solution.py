@@ -168,10 +168,10 @@ def proof(status: Status, length: float | None, bound: LowerBound | None) -> str
 
 
 CertifiedLevel = Literal["optimal", "bound", "none"]
-"""What a proof file shows of a tour: that it is the shortest, a lower bound, or nothing."""
+"""Level that a proof file shows: the tour is the shortest, a lower bound holds, or nothing."""
 
 NO_PROOF = "no proof was written"
-"""Reason why a tour is not certified, in files that state none."""
+"""Reason why a tour is not certified, for files without `certified_reason`."""
 
 EXACT_ROADMAPS = frozenset({"taut"})
 """Names of the roadmaps whose travel graph, with all classes, contains every admissible tour."""
@@ -270,9 +270,9 @@ class Solution(Drawn, FileModel):
     gap : float or None
         (length - lower_bound) / length.
     certified : {"optimal", "bound", "none"}
-        What the proof file that was written with this solution shows: that no tour is shorter, that
-        none is shorter than `certified_bound`, or nothing. Only the proof shows that it is true:
-        check it with `netsp verify --proof`.
+        Claim of the proof file that was written with this solution: no tour is shorter, none is
+        shorter than `certified_bound`, or nothing. Anyone can edit this field: check the proof
+        with `netsp verify --proof`.
     certified_reason : str
         Why `certified` is not "optimal"; empty if it is.
     certified_bound : float or None

@@ -26,10 +26,11 @@ from netsp_check.problem_file import read_problem
 from netsp_check.proof_check import cover
 
 Level = Literal["optimal", "bound", "none"]
-"""What a certificate shows: that a tour is the shortest, a bound on all tours, or nothing."""
+"""Level of a certificate: the tour is the shortest, a bound on all tours is proven, or nothing."""
 
 TARGET_SHARE = 0.9e-6
-"""Tolerance, as a share of a tour's length, by which the proven bound is below it."""
+"""Tolerance: share of a tour's length by which the target of a proof is below it, to leave room for
+the rounding of legs; a bound counts as the length up to a share of 1e-6."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +40,15 @@ class CertifyPolicy:
     Attributes
     ----------
     corners
-        Corners of the polygons inscribed in circles. The next number is tried when the bound of the
-        last one was too low, which more corners may mend.
+        Corners of the polygons inscribed in circles, one number for each attempt. More corners
+        raise the bounds on legs.
     max_shortfall
-        A tour that is shorter by more than this share of the length is not put down to the corners.
+        Attempts end when a tour over the checker's bounds on legs is shorter than the target by
+        more than this share, which more corners would not mend.
     search_share
         Share of the time for the search; the rest is for checking, or for a lower bound.
     max_vertices
-        Number of classes of all goals, from which on no proof is tried.
+        Most classes of all goals for which a proof is tried.
     search
         Policy of the search for duals and of the branching tree.
     """
@@ -125,7 +127,7 @@ def certify(
 def _obstruction(problem: Problem, solution: Solution) -> str:
     """Return why no proof can be tried, or an empty string."""
     if problem.state is not None:
-        return "the tour starts from a state"
+        return "the tour starts from a state, and proofs start at the base"
     if solution.roadmap not in EXACT_ROADMAPS:
         return f"proofs need the roadmap taut; this is {solution.roadmap}"
     if solution.status is Status.INFEASIBLE:
@@ -192,7 +194,9 @@ class _Attempt:
         size = f"{counted(len(tree.nodes), 'triangle')} of the cover"
         self.on_progress(f"classes {len(tree.vertices)}, {size}")
         if len(tree.vertices) > self.policy.max_vertices:
-            raise LimitReachedError(f"there are more than {self.policy.max_vertices} classes")
+            raise LimitReachedError(
+                f"there are more than {self.policy.max_vertices} classes; divide the goals"
+            )
         legs = LegBounds(tree)
         bound = Bound(tree, legs, target)
         alive = bound.reachable()
@@ -214,7 +218,7 @@ class _Attempt:
         found = graph.vertices_of([v.goal + 1 for v in visits], [v.signature for v in visits])
         tour = None if found is None else instance.rows_of([0, *found])
         if tour is None:
-            raise LimitReachedError("the tour's classes were not found again")
+            raise LimitReachedError("the checker's cover lacks a class of the tour")
 
         def on_round(bound: float) -> None:
             self.on_progress(f"bound {bound * 2.0**-self.exact.grid:.6g}")

@@ -25,8 +25,8 @@ from netsp.proof.dual_stage import CutTable, DualStage, Pair, Struck, strike_out
 from netsp_check.dual_bound import is_out_of_order
 
 NEGATIVE_TOLERANCE = 1e-9
-"""Tolerance, as a share of the target, below zero for the reduced cost of a leg that is priced
-in."""
+"""Tolerance, as a share of the target: pricing adds legs whose reduced costs are below zero by
+more."""
 
 REACH_ROOM = 1e-6
 """Tolerance, as a share of the target, by which the reach of a stage is larger than needed, because
@@ -34,7 +34,7 @@ some costs are estimates here."""
 
 
 class ShorterTourError(Exception):
-    """A tour over the checker's bounds on legs is shorter than the target.
+    """Error: a tour over the checker's bounds on legs is shorter than the target.
 
     Attributes
     ----------
@@ -56,17 +56,17 @@ class DualSearchPolicy:
     nearest_legs
         Legs of each vertex in the first LP.
     priced_per_vertex
-        Legs of each vertex that a pricing pass adds at most.
+        Most legs per vertex that a pricing pass adds.
     min_rise
-        Rounds of cuts end when the bound rises by less than this share of the gap.
+        A round of cuts that raises the bound by less than this share of the gap is idle.
     max_idle_rounds
-        Number of such rounds after which they end.
+        Idle rounds in a row after which no more cuts are added.
     candidates
-        Pairs, and as many vertices, that are probed before branching.
+        Number of pairs, and of vertices, that are probed before branching.
     probe_steps
         Simplex steps of a probe.
     max_leaves
-        Leaves of the branching tree after which the search gives up.
+        Most leaves of the branching tree; the search gives up beyond.
     max_root_gap
         The search gives up if the root's bound is below the target by more than this share.
     min_left
@@ -93,9 +93,9 @@ class ProofNode:
     stages
         Stages with their reach.
     pair, vertex
-        Pair of clusters or row of a vertex that it branches on, or None.
+        Pair of clusters, or row of a vertex, on which the node branches; None if it does not.
     children
-        Branches: apart and next for a pair, without and at for a vertex.
+        Branches: `apart` and `next` for a pair, `without` and `at` for a vertex.
     """
 
     stages: list[tuple[DualStage, int | None]] = field(default_factory=list)
@@ -273,14 +273,16 @@ class DualSearch:
             if np.count_nonzero(alive) > self.policy.min_left * before:
                 break
         parts = self._choose(node, point, alive, adjacent)
-        for some, pairs in parts:
+        for legs, pairs in parts:
             node.children.append(ProofNode())
-            self._branch(node.children[-1], vertices, some, pairs)
+            self._branch(node.children[-1], vertices, legs, pairs)
 
     def _close_leaf(self) -> None:
         self.leaves += 1
         if self.leaves > self.policy.max_leaves:
-            raise LimitReachedError("the branching tree has too many leaves")
+            raise LimitReachedError(
+                f"the branching tree has more than {self.policy.max_leaves} leaves"
+            )
 
     def _cut(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Point:
         """Return the LP's last point after rounds of cuts."""
@@ -288,7 +290,7 @@ class DualSearch:
         lp.set_costs(self._costs(alive, adjacent))
         while True:
             point = self._solve(lp)
-            bound = point.objective + self._charge * len(adjacent)
+            bound = point.objective + self._discount * len(adjacent)
             gap, rise = self.target - bound, bound - best
             idle = 0 if rise > self.policy.min_rise * max(gap, 0.0) else idle + 1
             best = max(best, bound)
@@ -313,7 +315,7 @@ class DualSearch:
         legs = np.zeros_like(self.instance.costs, dtype=bool)
         u, v = self.lp.legs[alive].T
         legs[u, v] = legs[v, u] = True
-        pairs = dict.fromkeys(adjacent, round(self._charge))
+        pairs = dict.fromkeys(adjacent, round(self._discount))
         struck = self._add_stage(node, _stage(point.duals, self.lp.cuts, pairs), vertices, legs)
         u, v = self.lp.legs.T
         left = alive & struck.legs[u, v]
@@ -352,8 +354,8 @@ class DualSearch:
         return struck
 
     @property
-    def _charge(self) -> float:
-        """Discount of the legs between a pair that must be adjacent."""
+    def _discount(self) -> float:
+        """Amount by which the LP lowers the costs of legs between a pair that must be adjacent."""
         return float(round(0.5 * self.target))
 
     def _costs(self, alive: Bools, adjacent: tuple[Pair, ...]) -> Floats:
@@ -361,7 +363,7 @@ class DualSearch:
         u, v = self.lp.legs.T
         costs = np.where(alive, self.instance.costs[u, v], 10.0 * self.target)
         for g, h in adjacent:
-            costs[self._is_between(g, h)] -= self._charge
+            costs[self._is_between(g, h)] -= self._discount
         return np.asarray(costs)
 
     def _is_between(self, g: int, h: int) -> Bools:
@@ -377,16 +379,16 @@ class DualSearch:
         for pair, vertex in self._candidates(point, adjacent):
             parts = self._parts(pair, vertex, alive, adjacent)
             gains = []
-            for some, pairs in parts:
+            for legs, pairs in parts:
                 self._check()
-                every = np.ones_like(some)
-                value = self.lp.probe(self._costs(some, pairs), every, self.policy.probe_steps)
-                value += self._charge * (len(pairs) - len(adjacent))
+                every = np.ones_like(legs)
+                value = self.lp.probe(self._costs(legs, pairs), every, self.policy.probe_steps)
+                value += self._discount * (len(pairs) - len(adjacent))
                 gains.append(max(min(value, 2.0 * self.target) - point.objective, 1.0))
             if gains[0] * gains[1] > best_gain:
                 best, best_gain = (pair, vertex, parts), gains[0] * gains[1]
         if best is None:
-            raise ShorterTourError(point.objective + self._charge * len(adjacent))
+            raise ShorterTourError(point.objective + self._discount * len(adjacent))
         node.pair, node.vertex, parts = best
         if node.pair is not None and node.pair[0]:
             inside = np.isin(self.instance.cluster, node.pair)

@@ -175,8 +175,8 @@ def strike_out(
     short
         Constant of the stage less the target.
     room
-        By how much the reach is larger than needed; None for a stage over known legs, which needs
-        no reach.
+        Amount by which the reach is larger than needed; None for a stage over known legs, which
+        needs no reach.
     """
     r = np.where(legs, reduced, np.inf)
     lowest = np.sort(np.partition(r, 1, axis=1)[:, :2], axis=1)
@@ -205,8 +205,8 @@ class _Clipped:
     short: int
 
     def values(self, reach: float) -> tuple[float, Floats, Bools]:
-        """Return twice the bound less twice the target, the share of each vertex's cluster in it
-        (n,), negative, and the mask of the vertices left."""
+        """Return twice the bound less twice the target, minus the share of each vertex's cluster in
+        the bound (n,), and the mask of the vertices left."""
         low = np.where(self.vertices, np.minimum(self.lowest, reach).sum(axis=1), np.inf)
         cheapest = np.full(int(self.cluster.max()) + 1, np.inf)
         np.minimum.at(cheapest, self.cluster, low)

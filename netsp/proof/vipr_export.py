@@ -2,10 +2,10 @@
 
 The format (version 1.0) is that of Cheung, Gleixner and Steffy, "Verifying Integer Programming
 Results" (IPCO 2017). Variables are the legs and vertices that the first stage of the proof leaves
-over; if that stage closes the proof, those within its reach. The file derives from their program
-that its objective is at least the target: by the duals of all further stages, reduced-cost fixing
-and branching. Without deriving it, it takes from the proof the costs of legs, that no other legs
-are in shorter tours, and that the cuts hold: VIPR does not know what a tour is.
+over; if that stage closes the proof, the legs within its reach. From this program the file derives
+that the objective is at least the target: by the duals of all further stages, reduced-cost fixing
+and branching. The file takes from the proof, without deriving it, the costs of legs, that no other
+legs are in shorter tours, and that the cuts hold: VIPR does not know what a tour is.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ class _Program(Bound):
 
     def __init__(self, problem_text: str, proof: dict[str, Any]) -> None:
         if proof["target"] is None or not proof["tree"].get("stages"):
-            raise InputError("proof: no tether reaches some goal; there is no program for VIPR")
+            raise InputError(
+                "proof: the tether is too short for some goal, so there is no program to export"
+            )
         super().__init__(tree := cover(problem_text, proof), LegBounds(tree), proof["target"])
         self._cuts = [read_cut(cut, self.cluster) for cut in proof.get("cuts", ())]
         self._tree, self._cap = dict(proof["tree"]), UNLIMITED
@@ -119,7 +121,9 @@ class _Program(Bound):
             if data and (end := self._fix(data, dead, ones)) is not None:
                 return end
         if "pair" not in node and "vertex" not in node:
-            raise InputError("proof: precedences close a branch; VIPR's program has none")
+            raise InputError(
+                "proof: precedences close a branch, and the program for VIPR has no precedences"
+            )
         kinds = ("apart", "next") if "pair" in node else ("without", "at")
         pair = tuple(sorted(node.get("pair", ())))
         chosen = [k for k, leg in enumerate(self._legs) if self._pair(*leg) == pair]

@@ -32,7 +32,7 @@ PROOFS = "proofs"
 """Name of the folder of proofs beside the problems."""
 
 CertifiedLevel = Literal["optimal", "bound", "none"]
-"""Level of a proof: that the tour is the shortest, a lower bound, or nothing."""
+"""Level of a proof: the tour is the shortest, a lower bound holds, or nothing is proven."""
 
 SAME_LENGTH_TOLERANCE = 1e-6
 """Tolerance, relative, for two lengths that count as equal."""
@@ -44,7 +44,7 @@ class PublishedProof(Model):
     bound: Annotated[
         Total, Field(description="no tour is shorter, as netsp_check finds; in the problem's units")
     ]
-    sha256: Annotated[str, Field(description="of the proof's file")]
+    sha256: Annotated[str, Field(description="sha256 of the proof file")]
 
 
 class Record(Model):
@@ -83,7 +83,7 @@ class Record(Model):
 
     @property
     def certified(self) -> CertifiedLevel:
-        """Level of the published proof: optimal, bound, or none; checking it confirms this."""
+        """Level of the published proof; `Library.check_published` confirms it."""
         if self.proof is None:
             return "none"
         proves = LowerBound(self.proof.bound, Scope.ALL_TOURS).proves(self.length)
@@ -240,7 +240,7 @@ class Library:
         for field in ("margin", "slack"):
             if value := getattr(checked, field):
                 raise VerificationError(
-                    f"{name}: the proof is about fewer tours: {field} is {value:g}; expected 0"
+                    f"{name}: the proof is for {field} {value:g}; expected {field} 0"
                 )
         return checked
 
@@ -255,13 +255,19 @@ class Library:
         record, path = self.records.get(name), self.proof_path(name)
         if record is None or record.proof is None:
             if path.exists():
-                raise VerificationError(f"{name}: {path} is there, but the record names no proof")
+                raise VerificationError(
+                    f"{name}: the record names no proof; remove {path}, or publish it"
+                )
             return None
         if not path.exists():
-            raise VerificationError(f"{name}: the record names a proof, but {path} is missing")
+            raise VerificationError(
+                f"{name}: {path}, which the record names, is missing; restore it"
+            )
         data = path.read_bytes()
         if hashlib.sha256(data).hexdigest() != record.proof.sha256:
-            raise VerificationError(f"{name}: {path} has another sha256 than the record says")
+            raise VerificationError(
+                f"{name}: {path} has another sha256 than the record; restore it"
+            )
         checked = self.checked_proof(name, data)
         _check_stated(record, checked.bound)
         return checked
@@ -274,7 +280,7 @@ class Library:
         Returns
         -------
         bool
-            Whether the proof was published.
+            True if the proof was published.
 
         Raises
         ------
@@ -286,9 +292,11 @@ class Library:
         checked = self.checked_proof(name, proof)
         record = self.records.get(name)
         if record is None:
-            raise InputError(f"problem: {name!r} has no record; expected one before its proof")
+            raise InputError(f"problem: {name!r} has no record; submit a tour before its proof")
         if record.proof is not None and checked.bound < record.proof.bound:
-            with contextlib.suppress(VerificationError):  # one that does not hold is replaced
+            with contextlib.suppress(
+                VerificationError
+            ):  # a published proof that does not hold is replaced
                 self.check_published(name)
                 return False
         stated = PublishedProof(bound=checked.bound, sha256=hashlib.sha256(proof).hexdigest())

@@ -75,10 +75,8 @@ def page(what: Opened) -> str:
     if found is not None:
         parts += ["<h2>Margins</h2>", briefing.margin_list(problem, found)]
     if run is None or is_same_problem:
-        parts += [
-            "<h2>Checks</h2>",
-            briefing.checks(with_claim(verify(problem, solution), solution)),
-        ]
+        verdict = with_claim(verify(problem, solution), solution)
+        parts += ["<h2>Checks</h2>", briefing.checks(verdict)]
     if problem.state is None and is_same_problem:
         parts += [
             "<h2>Measures of entanglement</h2>",
