@@ -23,7 +23,7 @@ from library_worlds import FOLDER
 from netsp import Problem, Solution, solve
 from netsp.base.errors import LimitReachedError, NetspError
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
-from netsp.proof.certify import certify
+from netsp.plan.proof.certify import certify
 from netsp.study.library import Library, Record
 
 SOLVE_S = 30.0

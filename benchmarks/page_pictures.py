@@ -146,7 +146,7 @@ def proof(target: Path) -> None:
     from matplotlib.figure import Figure
 
     from netsp import Problem, solve
-    from netsp.proof.certify import certify
+    from netsp.plan.proof.certify import certify
     from netsp.view.pictures import style
     from netsp.view.pictures.problem_picture import draw_map
     from netsp_check.problem_file import read_problem

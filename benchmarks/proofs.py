@@ -27,8 +27,8 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem, Status, solve
 from netsp.base.errors import InputError
+from netsp.plan.proof.certify import certify
 from netsp.plan.random_worlds import random_world
-from netsp.proof.certify import certify
 from netsp_check import Refused, check
 
 FAMILIES = ("icra2017", "rss2016", "clustered", "array", "harbour")

@@ -22,7 +22,7 @@ from typing import Any
 from netsp import Problem, Solution, solve
 from netsp.base.errors import InfeasibleError, NetspError
 from netsp.model.solution import Status
-from netsp.proof.certify import certify
+from netsp.plan.proof.certify import certify
 from netsp_check import Refused, check
 from netsp_check.covering_tree import CoveringTree
 from netsp_check.dual_bound import Bound

@@ -17,7 +17,7 @@ from netsp import Problem, Solution, solve, verify
 from netsp.base.errors import InputError, VerificationError
 from netsp.command.main import main
 from netsp.model.bound_scope import LowerBound, Scope
-from netsp.proof.certify import certify
+from netsp.plan.proof.certify import certify
 from netsp.study.library import Library, Record, rank
 from netsp.study.library.rank import Row, append_row, ranking, read_rows
 

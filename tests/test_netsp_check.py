@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from netsp import Circle, Polygon, Problem, solve
 from netsp.base.errors import InfeasibleError, NetspError
 from netsp.model.solution import Status
+from netsp.plan.proof.certify import CertifyPolicy, certify
+from netsp.plan.proof.cover_instance import CoverInstance
+from netsp.plan.proof.triangulate import triangulate
 from netsp.plan.random_worlds import random_world
 from netsp.plan.solve_problem import travel_graph
-from netsp.proof.certify import CertifyPolicy, certify
-from netsp.proof.cover_instance import CoverInstance
-from netsp.proof.triangulate import triangulate
 from netsp_check import Refused, check
 from netsp_check.dual_bound import Bound, Stage, _allowed, is_out_of_order, read_cut
 from netsp_check.leg_bounds import LegBounds

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Status, solve
+from netsp.plan.proof.certify import certify
 from netsp.plan.random_worlds import random_world
-from netsp.proof.certify import certify
 from netsp_check import check
 
 PROBLEMS = Path(__file__).parent.parent / "problems"

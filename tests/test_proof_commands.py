@@ -17,7 +17,7 @@ from netsp.command import proving
 from netsp.command.main import main
 from netsp.command.schema import schema_of
 from netsp.model.solution import NO_PROOF, Status
-from netsp.proof.certify import Certificate
+from netsp.plan.proof.certify import Certificate
 from netsp_check.__main__ import main as check_main
 
 ROOT = Path(__file__).parent.parent
@@ -182,7 +182,7 @@ def test_without_a_proof_the_solution_stays_and_no_file_is_written(monkeypatch, 
 
     tour, proof = tmp_path / "a.tour", tmp_path / "a.proof"
     for stand_in, says in ((late, "time limit reached"), (without, "more than 5000 classes")):
-        monkeypatch.setattr("netsp.proof.certify.certify", stand_in)
+        monkeypatch.setattr("netsp.plan.proof.certify.certify", stand_in)
         assert main(["solve", POOL, "-o", str(tour), "--proof", str(proof), "--quiet"]) == 0
         err = capsys.readouterr().err
         assert err.count("\n") == 1
@@ -208,7 +208,7 @@ def test_a_defect_of_the_prover_does_not_lose_the_solution(monkeypatch, tmp_path
 def test_an_interrupted_proof_leaves_the_solution(number, tmp_path):
     code = (
         "import sys\n"
-        "import netsp.proof.certify as prover\n"
+        "import netsp.plan.proof.certify as prover\n"
         "def slow(*_, on_progress, **__):\n"
         "    on_progress('bound 1')\n"
         "    while True:\n"

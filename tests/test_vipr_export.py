@@ -10,9 +10,9 @@ import pytest
 from netsp import Problem, solve
 from netsp.base.errors import InfeasibleError, InputError
 from netsp.command.main import main
-from netsp.proof.certify import CertifyPolicy, certify
-from netsp.proof.dual_search import DualSearchPolicy
-from netsp.proof.vipr_export import vipr
+from netsp.plan.proof.certify import CertifyPolicy, certify
+from netsp.plan.proof.dual_search import DualSearchPolicy
+from netsp.plan.proof.vipr_export import vipr
 
 FOLDER = Path(__file__).parent.parent / "problems"
 

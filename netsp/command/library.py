@@ -17,7 +17,7 @@ from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, Scope
 
 if TYPE_CHECKING:
     from netsp.model.solution import Solution
-    from netsp.study.library import Library, Record
+    from netsp.study.library import Comparison, Library, Record
 
 
 def run(args: argparse.Namespace) -> int:
@@ -124,20 +124,8 @@ def _check(args: argparse.Namespace, library: Library) -> int:
         solution = Solution.load(file)
         result = library.compared(solution)
         record = result.record
-        if not result.verification or result.length is None:
-            failed = True
-            why = next((c.name for c in result.verification.checks if not c.passed), "no tour")
-            text = f"not verified: {why}"
-        elif record is None or result.above is None:
-            text = f"{result.length:.9g}, verified; no tour of this problem was known"
-        elif result.better:
-            text = f"{result.length:.9g}, verified, {-100 * result.above:.4f} % shorter than known"
-        else:
-            proven = ", which is proven" if record.proven else ""
-            text = (
-                f"{result.length:.9g}, verified, {100 * max(result.above, 0.0):.4f} % above the "
-                f"best known, {record.length:.9g}{proven}"
-            )
+        failed |= not result.verification or result.length is None
+        text = _compared_in_words(result)
         certified = None
         if proof is not None and result.verification:
             certified = library.checked_proof(result.name, proof).bound
@@ -165,6 +153,23 @@ def _check(args: argparse.Namespace, library: Library) -> int:
     if args.json:
         json_output.tell({"checked": answers})
     return EXIT_NOT_VERIFIED if failed else 0
+
+
+def _compared_in_words(result: Comparison) -> str:
+    """Return in words how a solution compares with the record of its problem."""
+    record = result.record
+    if not result.verification or result.length is None:
+        why = next((c.name for c in result.verification.checks if not c.passed), "no tour")
+        return f"not verified: {why}"
+    if record is None or result.above is None:
+        return f"{result.length:.9g}, verified; no tour of this problem was known"
+    if result.better:
+        return f"{result.length:.9g}, verified, {-100 * result.above:.4f} % shorter than known"
+    proven = ", which is proven" if record.proven else ""
+    return (
+        f"{result.length:.9g}, verified, {100 * max(result.above, 0.0):.4f} % above the "
+        f"best known, {record.length:.9g}{proven}"
+    )
 
 
 def _states_higher(solution: Solution, record: Record | None) -> bool:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from netsp.base.clock import Clock
     from netsp.model.problem import Problem
     from netsp.model.solution import Solution
-    from netsp.proof.certify import Certificate
+    from netsp.plan.proof.certify import Certificate
 
 
 def check_provable(args: argparse.Namespace, problem: Problem) -> None:
@@ -96,7 +96,7 @@ def with_proof(
 def _write_for_vipr(file: str, problem: Problem, proof: bytes, clock: Clock) -> None:
     """Write the file for VIPR; if there is none, a warning says why."""
     from netsp.base.files import write_text
-    from netsp.proof.vipr_export import vipr
+    from netsp.plan.proof.vipr_export import vipr
 
     try:
         text = clock.bounded("exporting for VIPR", lambda: vipr(problem.to_json(), proof))
@@ -110,7 +110,7 @@ def _certificate(
 ) -> Certificate:
     """Return the certificate of a solution, or one of level "none" if time was up."""
     from netsp.base.interrupt_signals import until_interrupt
-    from netsp.proof.certify import Certificate, certify
+    from netsp.plan.proof.certify import Certificate, certify
 
     stopped, aim = "interrupted", _aim(solution)
     if clock.is_up:

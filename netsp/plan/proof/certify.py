@@ -15,9 +15,9 @@ from netsp.base.errors import LimitReachedError, counted
 from netsp.base.number_ranges import check_not_negative
 from netsp.model.problem import Problem
 from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
-from netsp.proof.cover_instance import CoverInstance
-from netsp.proof.dual_search import DualSearch, DualSearchPolicy, ProofNode, ShorterTourError
-from netsp.proof.triangulate import triangulate
+from netsp.plan.proof.cover_instance import CoverInstance
+from netsp.plan.proof.dual_search import DualSearch, DualSearchPolicy, ProofNode, ShorterTourError
+from netsp.plan.proof.triangulate import triangulate
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp_check import Refused, check
 from netsp_check.dual_bound import Bound

@@ -20,8 +20,8 @@ from netsp.mip.parity_cuts import odd_numbers, parity_cuts
 from netsp.mip.program import Duals, Point
 from netsp.mip.root import tour_legs
 from netsp.mip.subtours import fractional_cuts, label_families
-from netsp.proof.cover_instance import CoverInstance
-from netsp.proof.dual_stage import CutTable, DualStage, Pair, Struck, strike_out
+from netsp.plan.proof.cover_instance import CoverInstance
+from netsp.plan.proof.dual_stage import CutTable, DualStage, Pair, Struck, strike_out
 from netsp_check.dual_bound import is_out_of_order
 
 NEGATIVE_TOLERANCE = 1e-9
