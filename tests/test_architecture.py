@@ -33,7 +33,8 @@ def imports(path):
     """Modules of netsp that a file imports, at once, later or for its annotations."""
     found = []
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("netsp"):
+        is_ours = isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "netsp"
+        if is_ours:
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
                 found.append(whole if whole in MODULES else node.module)

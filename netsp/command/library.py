@@ -17,7 +17,8 @@ from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, Scope
 
 if TYPE_CHECKING:
     from netsp.model.solution import Solution
-    from netsp.study.library import Comparison, Library, Record
+    from netsp.study.library import Library, Record
+    from netsp.study.library.records import Comparison
 
 
 def run(args: argparse.Namespace) -> int:
