@@ -2,7 +2,8 @@
 
 PROBLEM is a problem file in the long form (`netsp verify PROBLEM --problem-output FILE` writes it),
 TOUR its solution file, or - for none, and PROOF the file that `netsp solve --proof` wrote.
-Exit codes: 0 the proof holds, 5 it does not or contradicts the tour, 2 a file cannot be read.
+Exit codes: 0 the proof holds, 5 it does not or contradicts the tour, 2 a file cannot be read,
+130 interrupted.
 """
 
 import json
@@ -46,6 +47,9 @@ def compared(tour: dict[str, Any], shown: Checked) -> str:
 
 def main(words: list[str]) -> int:
     """Check the files that are named, print what was found, and return the exit code."""
+    if words in (["-h"], ["--help"]):
+        print(__doc__, end="")
+        return 0
     if len(words) != 3:
         print(__doc__, end="", file=sys.stderr)
         return 2
@@ -69,4 +73,8 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        print("netsp_check: interrupted", file=sys.stderr)
+        sys.exit(130)

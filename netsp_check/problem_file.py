@@ -14,6 +14,9 @@ Exact = tuple[Fraction, Fraction]
 GRID_BITS = 36
 """Format constant: the size of a problem is between 2^35 and 2^36 grid units."""
 
+LONG_FORM = "`netsp verify PROBLEM --problem-output FILE` writes the long form"
+"""What to do about a problem file in a short form."""
+
 MAX_NUMBER = 1e15
 """Format limit: numbers of a problem file are smaller."""
 
@@ -107,7 +110,7 @@ def read_problem(text: str, margin: float = 0.0, slack: float = 0.0) -> Problem:
         obstacles.append(Obstacle(corners, growth / unit))
     box = data.get("bounds")
     if box is not None and (len(box) != 4 or any(isinstance(v, list) for v in box)):
-        raise Refused("bounds: expected [xmin, ymin, xmax, ymax]; an outline is a short form")
+        raise Refused(f"bounds: expected [xmin, ymin, xmax, ymax], no outline; {LONG_FORM}")
     clusters = _clusters(goals)
     return Problem(
         grid=grid,
@@ -124,7 +127,8 @@ def read_problem(text: str, margin: float = 0.0, slack: float = 0.0) -> Problem:
 
 def _check_fields(data: dict[str, Any], kind: str) -> None:
     if unknown := data.keys() - set(FIELDS[kind].split()):
-        raise Refused(f"{kind}: field {min(unknown)!r} is unknown, or a short form")
+        field = min(unknown)
+        raise Refused(f"{kind}: field {field!r} is unknown, or a short form; {LONG_FORM}")
 
 
 def _number(value: Any) -> float:

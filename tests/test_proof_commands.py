@@ -169,6 +169,10 @@ def test_a_goal_out_of_reach_is_proven_out_of_reach(tmp_path, capsys):
     problem.write_text(json.dumps(data))
     assert main(["solve", str(problem), "--proof", str(proof)]) == 3
     assert "there is no tour; anyone can check it" in capsys.readouterr().err
+    for words, level in (["--proof", str(proof)], "optimal"), ([], "none"):
+        out = ["-o", str(tmp_path / "short.tour"), "--json", "--quiet"]
+        assert main(["solve", str(problem), *out, *words]) == 3
+        assert json.loads(capsys.readouterr().out)["certified"] == level
     assert check_main([str(problem), "-", str(proof)]) == 0
     assert "there is no non-entangling tour with a tether of 5 m" in capsys.readouterr().out
 
@@ -288,6 +292,9 @@ def test_the_checker_refuses_unreadable_files_in_one_line(pool, tmp_path, capsys
         assert err.count("\n") == 1
         assert "cannot be read" in err
     assert check_main([]) == 2
+    capsys.readouterr()
+    assert check_main(["--help"]) == 0
+    assert capsys.readouterr().out.startswith("Check a proof")
 
 
 def test_the_checker_says_when_a_file_is_of_another_kind(pool, tmp_path, capsys):
@@ -298,7 +305,7 @@ def test_the_checker_says_when_a_file_is_of_another_kind(pool, tmp_path, capsys)
     corners = [[0, 0], [12.5, 0], [12.5, 6], [0, 6]]
     outline.write_text(json.dumps(json.loads(Path(POOL).read_text()) | {"bounds": corners}))
     assert check_main([str(outline), tour, proof]) == 5
-    assert "an outline is a short form" in capsys.readouterr().out
+    assert "no outline; `netsp verify PROBLEM --problem-output FILE`" in capsys.readouterr().out
     lacking = tmp_path / "lacking.proof"
     lacking.write_text('{"format": "netsp-proof 1"}')
     assert check_main([POOL, tour, str(lacking)]) == 5

@@ -47,13 +47,15 @@ def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
     }
 
 
-def of_infeasible(problem: Problem, error: InfeasibleError) -> dict[str, Any]:
-    """Return the output of `netsp solve` for a problem without a tour."""
+def of_infeasible(problem: Problem, error: InfeasibleError, none: Solution) -> dict[str, Any]:
+    """Return the output of `netsp solve` for a problem without a tour, and what its proof shows."""
     return {
         "problem": problem.name,
         "units": problem.units,
         "status": "infeasible",
         "message": str(error),
+        "certified": none.certified,
+        "certified_reason": none.certified_reason,
         "tether_length": problem.tether_length,
         "goal": None if error.goal is None else problem.goal_name(error.goal),
         "needed": error.needed if error.needed is not None and isfinite(error.needed) else None,

@@ -91,13 +91,13 @@ def run(args: argparse.Namespace) -> int:
                     raise
                 is_interrupted = bool(args.proof) and rest.is_stopped
         except InfeasibleError as error:
+            none = proving.infeasible_solution(problem, args)
             if args.proof:
-                none = proving.infeasible_solution(problem, args)
                 none = proving.with_proof(args.proof, problem, none, clock, tell, args.proof_vipr)
                 if table and none.certified == "optimal":
                     print(proof_line(problem, none, args.proof), file=sys.stderr)
             if args.json:
-                json_output.tell(json_output.of_infeasible(problem, error))
+                json_output.tell(json_output.of_infeasible(problem, error, none))
             raise
         solution = checked(problem, solution)
         if args.proof:
