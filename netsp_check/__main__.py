@@ -26,7 +26,7 @@ def sentences(problem: dict[str, Any], shown: Checked) -> list[str]:
     if shown.margin or shown.slack:
         out.append(f"Obstacles are grown by {shown.margin:g} {unit}; slack {shown.slack:g}.")
     if n := shown.closed_gaps:
-        out.append(f"Gaps narrower than three billionths of the size that count as closed: {n}.")
+        out.append(f"Gaps narrower than two billionths of the size that count as closed: {n}.")
     return out
 
 

@@ -24,7 +24,7 @@ class Checked(NamedTuple):
 
     The tour keeps `margin` more clearance than the problem asks for, and a share `slack` of its
     tether's length in reserve. Of the gaps between obstacles, `closed_gaps` that are narrower than
-    three billionths of the problem's size count as closed. `vertices`, `legs` and `leaves` count
+    two billionths of the problem's size count as closed. `vertices`, `legs` and `leaves` count
     classes of the tether, legs that were measured, and leaves of the branching tree.
     """
 

@@ -83,7 +83,7 @@ def proven_words(shown: Checked, units: str) -> str:
         parts.append(f"{100.0 * shown.slack:g} % slack")
     if shown.closed_gaps:
         gaps = counted(shown.closed_gaps, "gap")
-        parts.append(f"{gaps} narrower than three billionths of the problem's size count as closed")
+        parts.append(f"{gaps} narrower than two billionths of the problem's size count as closed")
     return ", ".join(parts)
 
 
