@@ -1,8 +1,8 @@
 """Attacks on proofs: mutations that stay well-formed, and forgeries made by hand.
 
 A false proof is one that is accepted although its bound is above the length of a tour. Mutations
-recompute what only guards against accidents (number and hash of the classes), so that these do not
-hide what the rest of the checker lets pass.
+compute the number and hash of the classes again, because these guard against accidents only: a
+wrong hash would refuse the proof before the rest of the checker sees it.
 """
 
 from __future__ import annotations
