@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from netsp.base.clock import Clock, TimeLimit
-from netsp.base.errors import LimitReachedError, counted
+from netsp.base.errors import InputError, LimitReachedError, counted
 from netsp.base.number_ranges import check_not_negative
 from netsp.model.problem import Problem
 from netsp.model.solution import EXACT_ROADMAPS, Solution, Status
@@ -110,6 +110,11 @@ def certify(
     on_progress : callable
         Called with a line of text.
 
+    Raises
+    ------
+    InputError
+        The solution is of another problem.
+
     Examples
     --------
     >>> from netsp import Problem, solve
@@ -118,6 +123,8 @@ def certify(
     >>> certificate.level, round(certificate.bound, 2)
     ('optimal', 51.96)
     """
+    if solution.problem.sha256 != problem.sha256:
+        raise InputError(f"solution: is of another problem than {problem.name!r}; plan again")
     if reason := _obstruction(problem, solution):
         return Certificate("none", reason)
     attempt = _Attempt(problem, solution, graph, Clock.from_limit(time_limit), policy, on_progress)

@@ -94,8 +94,10 @@ def page(what: Opened) -> str:
 
 def _proof(solution: Solution) -> str:
     """Return in words what is proven about a tour, after the status unless that says it."""
-    status = solution.status
-    return solution.proof if status.is_optimal else f"{status.value}, {solution.proof}"
+    status, words = solution.status, solution.proof
+    if solution.certified != "none":
+        words += ", as its file says; netsp verify checks that by the proof file"
+    return words if status.is_optimal else f"{status.value}, {words}"
 
 
 def _summary(problem: Problem, solution: Solution, what: Opened) -> str:
