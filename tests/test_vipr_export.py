@@ -178,7 +178,7 @@ def test_a_file_without_a_program_is_refused():
     with pytest.raises(InfeasibleError):
         solve(short)
     proof = {"format": "netsp-proof 1", "target": None, "tree": {}}
-    with pytest.raises(InputError, match="there is no program for VIPR"):
+    with pytest.raises(InputError, match="there is no program to export"):
         vipr(short.to_json(), json.dumps(proof).encode())
 
 

@@ -78,6 +78,11 @@ class Certificate:
         Length, in the problem's units, that no tour falls below; inf if there is no tour.
     proof : bytes or None
         Content of the proof file.
+
+    Examples
+    --------
+    >>> Certificate("none", "time is up").proof is None
+    True
     """
 
     level: Level
