@@ -405,7 +405,7 @@ def change_size(rng: random.Random, problem: Json, proof: Json) -> None:
 
 
 def change_tether(rng: random.Random, problem: Json, proof: Json) -> None:
-    problem["tether_length"] *= rng.choice([0.9, 0.999999, 1.000001, 1.1, 2.0])
+    problem["tether_length"] *= rng.choice([0.9, 0.999999, 1.000001, 1.1, 1.3])
 
 
 def change_goals(rng: random.Random, problem: Json, proof: Json) -> None:
