@@ -1,10 +1,13 @@
 """Soundness of `netsp_check`: laws against brute force, exact legs, enumeration of tours, hand-made
 triangulations, mutated proofs and forgeries."""
 
+import ast
 import itertools
 import json
 import math
 import random
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +15,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import netsp_check
 from netsp import Circle, Polygon, Problem, solve
 from netsp.base.errors import InfeasibleError, NetspError
 from netsp.model.solution import Status
@@ -580,3 +584,33 @@ def test_forged_proofs_are_refused(name):
     with pytest.raises(Refused) as caught:
         check(text, proof)
     assert "\n" not in str(caught.value)
+
+
+# size
+
+
+def test_the_checker_is_small_and_needs_the_standard_library_only():
+    """`netsp_check` has at most 900 lines without blank lines, comments and docstrings, and imports
+    nothing but the standard library and itself."""
+    count, imported = 0, set()
+    for path in Path(netsp_check.__file__).parent.glob("*.py"):
+        text = path.read_text()
+        tree = ast.parse(text)
+        documented = {
+            line
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            for line in range(node.lineno, (node.end_lineno or 0) + 1)
+        }
+        lines = enumerate(text.splitlines(), 1)
+        count += sum(
+            bool(line.strip()) and not line.strip().startswith("#") and k not in documented
+            for k, line in lines
+        )
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                imported.add((node.module or "").split(".")[0])
+    assert 0 < count <= 900
+    assert imported <= {"netsp_check", *sys.stdlib_module_names}
