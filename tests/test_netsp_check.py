@@ -138,7 +138,7 @@ def test_bounds_on_legs_are_nearly_exact(family, seed):
     assert check_legs(instance, graph, unit) < 1e-6
 
 
-MAX_LEGS = 150
+MAX_LEGS = 80
 """Legs of one world that are compared; of more, some are left out."""
 
 
