@@ -1,4 +1,4 @@
-"""What netsp calls the shortest tour is certified: of all shipped problems, and of random ones."""
+"""Optima of netsp are certified: those of all shipped problems, and of random ones."""
 
 from pathlib import Path
 
@@ -49,6 +49,11 @@ def test_goals_on_rays_of_obstacles_are_certified():
     pile = {"center": [7.2, 2.2], "radius": 0.25, "name": "pile"}
     data = {"base": [0.5, 3.0], "goals": goals, "obstacles": [pile], "tether_length": 14.0}
     assert uncertified(Problem.model_validate({"schema_version": 1, **data})) == ""
+
+
+def test_a_goal_straight_below_the_base_is_certified():
+    """The plan of such a problem is one point, and the box about it has a size all the same."""
+    assert uncertified(Problem(base=(2, 1), goals=[(2, 1, -5)], tether_length=9)) == ""
 
 
 @pytest.mark.parametrize("portion", range(PORTIONS))

@@ -194,7 +194,8 @@ def proof_line(problem: Problem, solution: Solution, file: str | None) -> str | 
     shown = solution.certified_lower_bound
     if solution.certified == "optimal" or shown is None:
         what = "there is no tour" if solution.length is None else "no tour is shorter"
-        command = f"netsp verify PROBLEM TOUR --proof {file}"
+        tour = "" if solution.length is None else "TOUR "
+        command = f"netsp verify PROBLEM {tour}--proof {file}"
         return f"proof    {file}: {what}; anyone can check it ({command})"
     return (
         f"proof    {file}: no tour is shorter than {shown.length:.6f} {problem.units}; no more is "

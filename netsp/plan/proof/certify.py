@@ -109,7 +109,7 @@ def certify(
     graph : TravelGraph, optional
         Travel graph of the problem, grown as for the solution; made if it is not given.
     time_limit : float or Clock, optional
-        Seconds.
+        Seconds for the search; `netsp_check` then checks the proof without a limit.
     policy : CertifyPolicy
         Sizes and limits.
     on_progress : callable

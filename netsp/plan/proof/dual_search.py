@@ -472,10 +472,7 @@ class DualSearch:
             lp.keep_cuts(active)
 
 
-def _stage(
-    duals: Duals | None, cuts: list[Cut], pairs: dict[Pair, int], scale: float = 1.0
-) -> DualStage:
+def _stage(duals: Duals | None, cuts: list[Cut], pairs: dict[Pair, int]) -> DualStage:
     """Return the stage of dual values of the LP."""
     assert duals is not None
-    by_cut = -0.5 * scale * duals.cut
-    return DualStage.rounded(0.5 * scale * duals.cluster, cuts, by_cut, pairs)
+    return DualStage.rounded(0.5 * duals.cluster, cuts, -0.5 * duals.cut, pairs)

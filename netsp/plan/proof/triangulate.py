@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp_check.problem_file import Obstacle, Problem
+from netsp_check.problem_file import Obstacle, Problem, Refused
 from netsp_check.triangulation import RESOLUTION
 
 SLIVER = 2.5
@@ -58,6 +58,11 @@ def triangulate(problem: Problem, corners: int) -> Mesh:
     ----------
     corners
         Corners of the polygon inscribed in a circle.
+
+    Raises
+    ------
+    Refused
+        The free space about the base is too narrow for the grid.
     """
     import shapely
 
@@ -77,7 +82,9 @@ def triangulate(problem: Problem, corners: int) -> Mesh:
     frame = box if box is not None else shapely.bounds(shapely.union_all(shapes)).tolist()
     free = shapely.difference(shapely.box(*frame), solid, grid_size=1.0)
     parts = [g for g in shapely.get_parts(free) if g.geom_type == "Polygon"]
-    base = next(g for g in parts if g.intersects(places[0]))
+    base = next((g for g in parts if g.intersects(places[0])), None)
+    if base is None:
+        raise Refused("the free space about the base is narrower than the grid")
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(base))
     return _mesh(triangles, box, bridges)
 
@@ -107,7 +114,8 @@ def _box(problem: Problem) -> list[int] | None:
         if all(first[i] <= reach and -reach <= last[i] for i in (0, 1)):
             low = [min(low[i], first[i]) for i in (0, 1)]
             high = [max(high[i], last[i]) for i in (0, 1)]
-    room = 0.01 * max(high[0] - low[0], high[1] - low[1])
+    # the size counts heights, too: a goal may be straight below the base
+    room = 0.01 * max(high[0] - low[0], high[1] - low[1], float(problem.size))
     box = [math.floor(v - room) for v in low] + [math.ceil(v + room) for v in high]
     if problem.bounds is not None:
         x0, y0, x1, y1 = problem.bounds
