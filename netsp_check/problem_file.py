@@ -15,7 +15,7 @@ GRID_BITS = 36
 """Format constant: the size of a problem is between 2^35 and 2^36 grid units."""
 
 LONG_FORM = "`netsp verify PROBLEM --problem-output FILE` writes the long form"
-"""What to do about a problem file in a short form."""
+"""Advice for a problem file in a short form."""
 
 MAX_NUMBER = 1e15
 """Format limit: numbers of a problem file are smaller."""

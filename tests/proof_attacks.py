@@ -858,7 +858,7 @@ def margin_below_zero() -> tuple[str, bytes]:
 
 
 def endless_tree() -> tuple[str, bytes]:
-    """A tree of so many levels that the checker would break off."""
+    """A tree with more levels than Python's limit of recursion."""
     text, proof = _raised()
     first = json.dumps(proof["tree"]["stages"][0])
     levels = 20_000

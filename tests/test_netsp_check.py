@@ -220,7 +220,7 @@ def test_a_clockwise_triangle_is_refused():
 
 
 def test_a_hole_over_free_space_is_refused():
-    """Where a triangle is missing, its edges lie in free space."""
+    """A missing triangle leaves edges in free space, which are refused."""
     for k in range(8):
         refused("not in an obstacle|no triangle holds it", ring()[:k] + ring()[k + 1 :])
 
@@ -282,7 +282,7 @@ def test_a_box_beyond_the_bounds_is_refused():
 
 
 def test_an_obstacle_that_the_box_touches_bounds_nothing():
-    """Where an obstacle touches the side of the box, paths outside the box lead around it."""
+    """An obstacle that touches the box may bound no triangle: paths outside the box pass it."""
     inner = (4.01, -0.5, 5.99, 0.5)
     for box in ([-4, -2, 12, 4], [-4, -2, 12, 2], [-4, -1, 12, 4]):
         refused("not in an obstacle", ring(inner, box), box)
