@@ -72,7 +72,7 @@ def test_a_cross_section_is_deeper_in_its_solid_than_paths_and_tethers_dip_at_al
         ("cylinder", {"a": [0, 0, -2.9], "b": [0, 0, 1], "radius": 0.5}),  # above the floor
         ("box", {"center": [0, 0, -2], "size": [1, 1, 3.9]}),
         ("box", {"center": [0, 0, -1.5], "size": [1, 1, 5], "rotation": [0, 2, 0]}),  # leaning
-        ("capsule", {"a": [0, 0, -2.9], "b": [0, 0, -0.1], "radius": 0.5}),
+        ("capsule", {"a": [0, 0, -2.5], "b": [0, 0, -0.5], "radius": 0.5}),  # its caps end there
         ("torus", {"center": [0, 0, -1], "major_radius": 1, "minor_radius": 0.2}),
     ],
 )
@@ -83,6 +83,28 @@ def test_a_solid_that_a_tether_may_pass_over_or_under_has_no_cross_section(kind,
     # and far off it does not matter
     far = Depths(-3.0, 0.0, np.array([40.0, 0.0, -1.0]), 12.0)
     assert cross_sections(Scene(solids=[{kind: solid}]).field(), far, DIP) == ([], True)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    foot=st.floats(-4.0, -2.2), top=st.floats(-0.8, 1.0), radius=st.floats(0.1, 1.5),
+    lean=st.sampled_from([0.0, 9e-4]),
+)  # fmt: skip
+def test_a_capsule_whose_caps_reach_beyond_the_range_stands_through_it(foot, top, radius, lean):
+    capsule = {"a": [0, 0, foot], "b": [lean * (top - foot), 0, top], "radius": radius}
+    field = Scene(solids=[{"capsule": capsule}]).field()
+    obstacles, all_upright = cross_sections(field, DEPTHS, DIP)
+    beyond = max(foot - DEPTHS.low, DEPTHS.high - top, 0.0)
+    assert all_upright == bool(obstacles) or radius <= 0.05
+    if beyond + 0.01 < radius - DIP:
+        assert all_upright
+    if beyond > radius - DIP:
+        assert not obstacles
+    for obstacle in obstacles:
+        flat = corners_of(obstacle)
+        for z in np.linspace(DEPTHS.low, DEPTHS.high, 7):
+            points = np.column_stack([flat, np.full(len(flat), z)])
+            assert field.distance(points).max() <= -DIP * (1.0 - 1e-9)
 
 
 BOX = {"box": {"center": [0, 0, 0], "size": [1.0, 6.0, 4.0]}}

@@ -141,11 +141,20 @@ def _section(
         a = row[:3]
         b = a + row[7] * row[3:6] if kind == solids.CYLINDER else row[3:6]
         lean, radius = _lean(b - a), float(row[6])
-        spare = MIN_EXCESS_RATIO * dip + lean * radius
-        if lean > MAX_LEAN or not _spans((a[2], b[2]), depths, spare):
+        if lean > MAX_LEAN:
             return False, None
+        within, cap = radius + offset - deep, 0.0
+        if kind == solids.CYLINDER:
+            if not _spans((a[2], b[2]), depths, MIN_EXCESS_RATIO * dip + lean * radius):
+                return False, None
+        else:
+            cap = _height_in_cap((a[2], b[2]), depths, lean * radius)
+            if 0.0 < within <= cap:
+                return False, None
         middle = a + (depths.middle - a[2]) / (b[2] - a[2]) * (b - a)
-        return True, _circle(middle[:2], radius + offset - deep - lean * depths.half)
+        # a cap of the capsule is narrowest at the end of the range
+        narrowest = math.sqrt(max(0.0, within * abs(within) - cap**2))
+        return True, _circle(middle[:2], narrowest - lean * (depths.half + cap))
     if kind == solids.BOX:
         return _box_section(row, depths, dip, offset - deep)
     if kind == solids.HALF_SPACE:
@@ -186,6 +195,13 @@ def _lean(axis: Floats) -> float:
     if axis[2] == 0.0:
         return math.inf
     return math.hypot(axis[0], axis[1]) / abs(float(axis[2]))
+
+
+def _height_in_cap(ends: tuple[float, float], depths: Depths, spare: float) -> float:
+    """Return the height by which a range exceeds the axis of an upright capsule, and so reaches
+    into its caps, metres; 0 if the axis exceeds the range by `spare`."""
+    below, above = min(ends) - depths.low, depths.high - max(ends)
+    return max(0.0, below + spare, above + spare)
 
 
 def _spans(ends: tuple[float, float], depths: Depths, spare: float) -> bool:
