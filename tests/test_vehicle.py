@@ -20,6 +20,7 @@ from netsp.world.vehicle.dynamics import (
     step_jacobians,
 )
 from netsp.world.vehicle.kinematic import KinematicVehicle, wrapped_angle
+from netsp.world.vehicle.vehicle_policy import VehiclePolicy
 
 STILL = np.zeros(3)
 
@@ -117,6 +118,64 @@ def test_it_follows_a_circle_to_centimetres_whatever_the_current(water):
     assert np.abs(off[40:]).max() < 0.03
     assert np.linalg.norm(places[-1] - [0, 0, 0.2 * np.pi]) < 0.05
     assert wrapped_angle(rov.yaw - 0.5) == pytest.approx(0.0, abs=0.05)
+
+
+def distance_to(path, place):
+    """Distance, metres, of a place from the polyline (k, 3) of a path."""
+    a, d = path[:-1], np.diff(path, axis=0)
+    share = ((place - a) * d).sum(1) / np.maximum((d * d).sum(1), 1e-12)
+    return float(np.linalg.norm(a + np.clip(share, 0, 1)[:, None] * d - place, axis=1).min())
+
+
+def followed(path, speed, water, yaws, max_s):
+    """Seconds until a BlueROV2 is at the end of a path (k, 3), infinite after `max_s`, and its
+    largest distance from the path, metres. The wish for a heading changes every two seconds."""
+    rov, rest, off = make_vehicle("bluerov2", path[0], speed), path[1:], 0.0
+    for k in range(round(10 * max_s)):
+        _, passed = rov.go(rest, 0.1, yaws[k // 20 % len(yaws)], water, k == 0)
+        rest = rest[min(passed, len(rest) - 1) :]
+        off = max(off, distance_to(path, rov.position))
+        if len(rest) == 1 and np.linalg.norm(rov.position - path[-1]) < 0.05:
+            return 0.1 * (k + 1), off
+    return math.inf, off
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.8, 1.0, 1.5])
+def test_it_passes_narrow_turns_at_any_speed(speed):
+    """Over a plate and down behind it: the way ahead comes back past the vehicle, where the mean
+    of the places to come is a place to stay for good."""
+    path = np.array([[0, 0, 0], [0, 0, 1.5], [0.5, 0, 1.5], [0.5, 0, 0], [1, 0, 0], [1, 0, 1.5]])
+    seconds, off = followed(path, speed, STILL, [0.0], 60.0)
+    assert seconds < 7.0 / min(speed, 0.5) + 8.0
+    assert off < VehiclePolicy().max_lead + 0.03
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(
+    corners=st.lists(st.tuples(*[st.floats(-0.8, 0.8)] * 3), min_size=2, max_size=4),
+    speed=st.sampled_from([0.5, 0.8, 1.0, 1.5]),
+    current=st.tuples(*[st.floats(-0.17, 0.17)] * 3),
+    yaws=st.lists(st.floats(-math.pi, math.pi), min_size=1, max_size=4),
+)
+def test_it_arrives_along_any_path_in_any_current_that_it_masters(corners, speed, current, yaws):
+    path = np.vstack([np.zeros(3), np.cumsum(corners, axis=0)])
+    seconds, off = followed(path, speed, np.array(current), yaws, 60.0)
+    assert seconds < 60.0
+    assert off < VehiclePolicy().max_lead + 0.05  # it does not know the current at first
+
+
+def test_a_point_that_waits_is_come_to():
+    """A vehicle that was carried off its path comes back to it before it goes on."""
+    rov, path = make_vehicle("bluerov2", np.zeros(3), 1.0), np.array([[4.0, 0, 0]])
+    rov.go(path, 0.1, 0.0, STILL, True)
+    rov.state[:3] += [0.0, 0.6, 0.0]
+    places = []
+    for _ in range(80):
+        rov.go(path, 0.1, 0.0, STILL, False)
+        places.append(rov.position)
+    back = next(k for k, p in enumerate(places) if abs(p[1]) < 0.2)
+    assert places[back][0] < 0.4
+    assert np.linalg.norm(places[-1] - path[-1]) < 0.05
 
 
 @settings(max_examples=10, deadline=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -33,10 +34,12 @@ class BlueRov2:
         self.control_s: list[float] = []
         self._control = PredictiveControl(policy.control)
         self._followed = np.array(place, dtype=float)
+        self._pace, self._heading = 1.0, 0.0
         self._drift = np.zeros(3)
         # load compiled code before the first step
         aims = np.tile(self.state, (policy.control.horizon, 1))
         self._control.force(self.state, aims, self._drift)
+        self._control.error(self._control.guess, self.state, aims, self._drift)
         self._control = PredictiveControl(policy.control)
 
     @property
@@ -64,15 +67,8 @@ class BlueRov2:
             self._followed = self.position
         for _ in range(max(1, round(seconds / step_s))):
             begin = time.perf_counter()
-            lead = float(np.linalg.norm(self._followed - self.position))
-            on, passed = advance_along(
-                self._followed,
-                path[behind:],
-                min(self.speed * step_s, max(0.0, policy.max_lead - lead)),
-            )
-            self._followed = on[-1]
+            force, passed = self._followed_on(path[behind:], yaw)
             behind += passed
-            force = self._control.force(self.state, self._aims(path[behind:], yaw), self._drift)
             expected = step(self.state, force, self._drift, step_s)
             self.control_s.append(time.perf_counter() - begin)
             for _ in range(policy.integration_steps):
@@ -81,6 +77,50 @@ class BlueRov2:
             self._drift += policy.drift_gain * (self.state[:3] - expected[:3]) / step_s
             points.append(self.position)
         return points, behind
+
+    def _followed_on(self, path: Floats, yaw: float) -> tuple[Floats, int]:
+        """Move the followed point on along a path (k, 3), at the fastest pace at which the vehicle
+        keeps up with it.
+
+        A reference governor (Garone, Di Cairano and Kolmanovsky, "Reference and command governors
+        for systems with constraints", Automatica 75, 2017): a pace is accepted if the model stays
+        within `max_lead` of a point that moves on at this pace for the next `lead_steps`. At pace 0
+        the point waits and the vehicle comes to it, so that it can move on.
+
+        Returns
+        -------
+        force : ndarray, shape (4,)
+            Input of the next step.
+        passed : int
+            Number of points of the path that the followed point has passed.
+        """
+        policy, control, state, water = self.policy, self._control, self.state, self._drift
+        thrusts = control.guess
+        for pace in self._paces():
+            speed = self.speed * pace
+            on, passed = advance_along(self._followed, path, speed * policy.control.step_s)
+            aims = self._aims(on[-1], path[passed:], yaw, speed)
+            for _ in range(policy.max_iterations):
+                thrusts = control.improved(thrusts, state, aims, water)
+                error = control.error(thrusts[: policy.lead_steps], state, aims, water)
+                is_close = error <= policy.max_lead
+                if is_close:
+                    break
+            if is_close:
+                break
+        self._pace, self._followed = pace, on[-1]
+        self._heading = self._turned_towards(yaw, self._heading)
+        return control.apply(thrusts), passed
+
+    def _paces(self) -> Iterator[float]:
+        """Yield the paces to try, as shares of the cruise speed, from the fastest one down to 0."""
+        policy = self.policy
+        pace = max(self._pace, policy.min_pace)
+        yield min(1.0, policy.pace_growth * pace)
+        while pace >= policy.min_pace:
+            yield pace
+            pace *= policy.pace_cut
+        yield 0.0
 
     def _in_frame(self, pull: Floats) -> Floats:
         """Return a force (3,) of the world as an input (4,) of the vehicle."""
@@ -91,26 +131,33 @@ class BlueRov2:
         """See `netsp.world.vehicle.Vehicle`."""
         self.state[:3] = place
         self.state[4:] = 0.0
-        self._followed = np.array(place)
+        self._followed, self._heading = np.array(place), self.yaw
 
-    def _aims(self, path: Floats, yaw: float) -> Floats:
-        """Return (horizon, 8) the places and velocities of the followed point, with the heading."""
+    def _aims(self, start: Floats, path: Floats, yaw: float, speed: float) -> Floats:
+        """Return (horizon, 8) the states of a point that moves on along a path (k, 3) at a speed,
+        m/s, and turns to a heading, rad."""
         horizon, step_s = self.policy.control.horizon, self.policy.control.step_s
         aims = np.zeros((horizon, 8))
-        heading = self.state[3] + wrapped_angle(yaw - self.state[3])
-        c, s = math.cos(heading), math.sin(heading)
-        at, rest = self._followed, path
+        at, rest, heading = start, path, self._heading
         for k in range(horizon):
+            turned = self._turned_towards(yaw, heading)
+            rate, heading = (turned - heading) / step_s, turned
             if k > 0:
-                on, passed = advance_along(at, rest, self.speed * step_s)
+                on, passed = advance_along(at, rest, speed * step_s)
                 velocity = (on[-1] - at) / step_s - self._drift
                 at, rest = on[-1], rest[passed:]
             else:
                 velocity = -self._drift
                 if len(rest) and (far := float(np.linalg.norm(rest[0] - at))) > 0.0:
-                    velocity = velocity + (rest[0] - at) * (self.speed / far)
+                    velocity = velocity + (rest[0] - at) * (speed / far)
+            c, s = math.cos(heading), math.sin(heading)
             aims[k, :3], aims[k, 3] = at, heading
             aims[k, 4] = c * velocity[0] + s * velocity[1]
             aims[k, 5] = -s * velocity[0] + c * velocity[1]
-            aims[k, 6] = velocity[2]
+            aims[k, 6], aims[k, 7] = velocity[2], rate
         return aims
+
+    def _turned_towards(self, yaw: float, heading: float) -> float:
+        """Return a heading, rad, after one control step of turning to another."""
+        max_turn = math.radians(self.policy.max_turn_rate_deg) * self.policy.control.step_s
+        return heading + min(max(wrapped_angle(yaw - heading), -max_turn), max_turn)

@@ -11,12 +11,13 @@ for products this small, which wait for one another.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from netsp.base.arrays import Floats
-from netsp.base.compiled.dynamic_array import write_floats, write_rows
+from netsp.base.compiled.dynamic_array import write_floats
 from netsp.base.compiled.kernel import kernel
 from netsp.world.vehicle.dynamics import ALLOCATION, MAX_THRUST, step_into, step_jacobians
 from netsp.world.vehicle.vehicle_policy import ControlPolicy
@@ -59,26 +60,78 @@ class PredictiveControl:
         water : ndarray, shape (3,)
             Estimated velocity of the water, m/s.
         """
-        self.thrusts = improved_thrusts(self.thrusts, state, aims, water, ALLOCATION, self._weights)
-        return np.asarray(ALLOCATION @ self.thrusts[0])
+        thrusts = self.improved(self.guess, state, aims, water)
+        return self.apply(thrusts)
+
+    @property
+    def guess(self) -> Floats:
+        """Last solution (horizon, 5), moved on by one step, N."""
+        return np.vstack([self.thrusts[1:], self.thrusts[-1:]])
+
+    def improved(self, guess: Floats, state: Floats, aims: Floats, water: Floats) -> Floats:
+        """Return the thrusts (horizon, 5) after one iteration from a guess (horizon, 5), N, without
+        applying them; see `force` for the other parameters."""
+        before, weights = self.thrusts[0], self._weights
+        return np.asarray(improved_thrusts(guess, before, state, aims, water, ALLOCATION, weights))
+
+    def error(self, thrusts: Floats, state: Floats, aims: Floats, water: Floats) -> float:
+        """Return the largest distance between the vehicle and its aim, metres, after any of the
+        next steps.
+
+        Parameters
+        ----------
+        thrusts : ndarray, shape (n, 5)
+            Thrusts of the next steps, N.
+        state, aims, water
+            See `force`; at least n aims.
+        """
+        step_s = self._weights.step_s
+        return float(largest_error(thrusts, state, aims, water, ALLOCATION, step_s))
+
+    def apply(self, thrusts: Floats) -> Floats:
+        """Return the input (4,) of the next step by thrusts (horizon, 5), N; the next solution
+        starts from them."""
+        self.thrusts = thrusts
+        return np.asarray(ALLOCATION @ thrusts[0])
+
+
+@kernel
+def largest_error(
+    thrusts: Floats, state: Floats, aims: Floats, water: Floats, allocation: Floats, step_s: float
+) -> float:
+    """Return the largest distance, metres, between the position and its aim after any step, if the
+    thrusts (n, m) are applied from a state on."""
+    n, m = thrusts.shape
+    now, after, room = state.copy(), np.empty(8), np.empty((5, 8))
+    force, worst = np.empty(4), 0.0
+    for k in range(n):
+        force[:] = 0.0
+        for i in range(m):
+            force += thrusts[k, i] * allocation[:, i]
+        step_into(after, now, force, water, step_s, room)
+        write_floats(now, after, 8)
+        squared = 0.0
+        for i in range(3):
+            squared += (now[i] - aims[k, i]) ** 2
+        worst = max(worst, squared)
+    return math.sqrt(worst)
 
 
 @kernel
 def improved_thrusts(
-    last: Floats,
+    guess: Floats,
+    before: Floats,
     state: Floats,
     aims: Floats,
     water: Floats,
     allocation: Floats,
     weights: ControlWeights,
 ) -> Floats:
-    """Return the thrusts (n, m) after one iteration, from those of the step before."""
-    n, m = last.shape
+    """Return the thrusts (n, m) after one iteration from a guess (n, m), where those of the step
+    before are (m,)."""
+    n, m = guess.shape
     step_s, state_cost, max_thrust = weights.step_s, weights.state, weights.max_thrust
     thrust_cost, change_cost = weights.thrust, weights.change
-    guess = np.empty((n, m))
-    write_rows(guess, last[1:], n - 1)
-    write_floats(guess[-1], last[-1], m)
     forces = np.zeros((n, 4))
     for k in range(n):
         for i in range(m):
@@ -102,8 +155,8 @@ def improved_thrusts(
         for i in range(m):
             j = m * k + i
             hessian[j, j] += thrust_cost + change_cost
-            before = guess[k - 1, i] if k > 0 else last[0, i]
-            wish[j] += thrust_cost * guess[k, i] + change_cost * (guess[k, i] - before)
+            last = guess[k - 1, i] if k > 0 else before[i]
+            wish[j] += thrust_cost * guess[k, i] + change_cost * (guess[k, i] - last)
             if k + 1 < n:
                 hessian[j, j] += change_cost
                 hessian[j + m, j] -= change_cost
