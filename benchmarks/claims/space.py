@@ -200,6 +200,25 @@ def bounds() -> tuple[str, bool]:
     return f"{above} of 2 above", above == 0
 
 
+def law() -> tuple[str, bool]:
+    """Bounds beside paths and tours that were found without netsp, in a few random scenes."""
+    import tempfile
+    from pathlib import Path
+
+    from one_corner_paths import compare
+
+    kinds = (
+        "posts", "end near the surface", "uprights and more", "rings", "cube frames", "jackets",
+        "pipes", "walls with slots", "combs", "boulders", "tunnels",
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        found = [compare(kind, 11, Path(folder)) for kind in kinds]
+    compared = [c for c in found if c is not None]
+    above, legs = sum(c.above for c in compared), sum(c.legs for c in compared)
+    shown = f"{above} above {legs} paths and {len(compared)} tours"
+    return shown, above == 0 and len(compared) >= 9
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("words: groups of seven scenes", "as known", groups)
@@ -209,6 +228,7 @@ def claims() -> Iterator[Claim]:
     )
     yield Claim("solve: a planned order again, in 2 s", "no worse; verified", no_worse)
     yield Claim("bounds in space: walls with slots", "none above a known tour", bounds)
+    yield Claim("bounds in space: random scenes of eleven kinds", "none above a path or tour", law)
     yield solved("basin", 33.0, 25.0)
     yield solved("ring", 46.0, 15.0)
     yield solved("hull", 80.0, 35.0)
