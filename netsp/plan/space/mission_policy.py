@@ -160,12 +160,16 @@ class PlanePolicy:
     corner_segments
         Segments of a quarter circle around the corners of a prism that grows by more than the
         others. More segments follow the circle more closely, and make more corners.
+    tether_margin
+        Share of the tether that tours of the plane leave over, because a tether in space is
+        measured as a polyline; from 0 to 1.
     """
 
     max_classes: int = 1000
     max_s: float = 15.0
     time_share: float = 0.6
     corner_segments: int = 4
+    tether_margin: float = 1e-5
 
     def __post_init__(self) -> None:
         if self.max_classes < 1:
@@ -173,7 +177,7 @@ class PlanePolicy:
         if not self.max_s > 0.0:
             raise InputError(f"max_s: expected more than 0, got {self.max_s:g}")
         _check_minimum(self, corner_segments=1)
-        _check_shares(self)
+        _check_shares(self, "tether_margin")
 
 
 @dataclass(frozen=True)
@@ -220,6 +224,9 @@ class BoundPolicy:
     ----------
     upright_share
         Share of the remaining time for the bound among upright solids, from 0 to 1.
+    max_classes
+        Maximum number of augmented goals, at least 1, for which the robot's clearance is in the
+        bound among upright solids; the costs of their legs take eight bytes for each pair.
     max_detour_ratio
         Longest path considered where no path is known, as a multiple of the straight distance;
         more than 1.
@@ -234,6 +241,7 @@ class BoundPolicy:
     """
 
     upright_share: float = 0.4
+    max_classes: int = 4000
     max_detour_ratio: float = 2.2
     max_leg_gap: float = 2e-3
     min_solve_s: float = 0.3
@@ -245,7 +253,7 @@ class BoundPolicy:
             raise InputError(f"max_detour_ratio: {self.max_detour_ratio}; expected more than 1")
         if not self.min_solve_s > 0.0:
             raise InputError(f"min_solve_s: {self.min_solve_s}; expected more than 0")
-        _check_minimum(self, cell_s=0.0)
+        _check_minimum(self, cell_s=0.0, max_classes=1)
 
 
 @dataclass(frozen=True)

@@ -24,14 +24,10 @@ from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import BoundPolicy, PotentialPolicy
-from netsp.plan.space.planning_context import (
-    CLEARANCE_TOLERANCE,
-    DEPTH_TOLERANCE,
-    is_straight_clear,
-)
+from netsp.plan.space.planning_context import is_straight_clear
 from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
-from netsp.plan.space.upright import bound_by_upright_solids
+from netsp.plan.space.upright import bound_by_upright_solids, judged_room
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.travel_graph import TravelGraph
 
@@ -170,8 +166,7 @@ class LegBounds:
         (`netsp.plan.space.planning_context.keeps_clearance`)."""
         mission, context = self.paths.context.mission, self.paths.context
         room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
-        # between two samples of a path, solids may be nearer by half a step
-        room = max(room - 0.5 * mission.delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
+        room = judged_room(room, mission.delta)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
         if context.bounds is not None:
             bounds = np.array(context.bounds).reshape(2, 3)

@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from netsp.model.problem import Circle, Goal, Polygon, Problem
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.board import DrivenTour
+from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.driven_legs import LegTo, drive_legs
 from netsp.plan.space.mission_policy import PlanePolicy
 from netsp.plan.space.places import Places
@@ -212,21 +215,44 @@ def drive_plane_tours(
         return
     usable = context.policy.tether_share
     plane = _PlaneTour(context, scene, places, plan, policy)
-    for share in (1.0, usable) if whole_tether else (usable,):
-        if clock.is_up:
-            return
-        try:
-            found = plane.shortest_legs(share, Clock(policy.max_s, within=clock.part(0.5)), seed)
-        except (InputError, InfeasibleError, LimitReachedError):
-            continue
-        if found is not None:
-            legs, home, is_optimal = found
-            driven = drive_legs(context, legs, home)
-            if driven is not None:
-                yield driven
-                longest = max(visit.longest_tether for visit in driven.visits)
-                if is_optimal and longest <= usable * context.mission.tether_length:
-                    return
+    shares = (1.0 - policy.tether_margin, usable) if whole_tether else (usable,)
+    for share in shares:
+        shortest: DrivenTour | None = None
+        is_optimal = False
+        for touches in (True, False):
+            if clock.is_up or is_optimal:
+                break
+            try:
+                part = Clock(policy.max_s, within=clock.part(0.5))
+                found = plane.shortest_legs(share, touches, part, seed)
+            except (InputError, InfeasibleError, LimitReachedError):
+                continue
+            driven = None if found is None else drive_legs(context, found.legs, found.home)
+            if found is not None and driven is not None:
+                is_optimal = found.is_optimal
+                if shortest is None or driven.length < shortest.length:
+                    shortest = driven
+        if shortest is not None:
+            yield shortest
+            longest = max(visit.longest_tether for visit in shortest.visits)
+            if is_optimal and longest <= usable * context.mission.tether_length:
+                return
+
+
+class _PlaneLegs(NamedTuple):
+    """Shortest tour of the plane.
+
+    Attributes
+    ----------
+    legs, home
+        Legs to the visits, and the path home (k, 3), metres.
+    is_optimal
+        Whether the solver proved that no tour of the plane is shorter, in any class.
+    """
+
+    legs: list[LegTo]
+    home: Floats
+    is_optimal: bool
 
 
 @dataclass(frozen=True)
@@ -240,23 +266,29 @@ class _PlaneTour:
     policy: PlanePolicy
 
     def shortest_legs(
-        self, share: float, clock: Clock, seed: int
-    ) -> tuple[list[LegTo], Floats, bool] | None:
-        """Return the legs of the shortest tour for a share of the tether, the path home, and True
-        if the solver proved that it is the shortest of the plane."""
+        self, share: float, touches: bool, clock: Clock, seed: int
+    ) -> _PlaneLegs | None:
+        """Return the legs of the shortest tour for a share of the tether.
+
+        Parameters
+        ----------
+        touches : bool
+            Whether the tether may touch the prisms; if not, it keeps the robot's clearance.
+        """
         context, places = self.context, self.places
         mission = context.mission
         start = len(places)  # number of the goal at the start, used if the start is not the anchor
         points = np.vstack([places.points, mission.start])
         starts_elsewhere = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
         goals = np.arange(len(points) if starts_elsewhere else start)
-        goals = goals[self._goals_in_reach(points, goals, share)]
+        tether_problem = partial(self._problem, share=share, touches=touches)
+        goals = goals[self._goals_in_reach(tether_problem(points[goals]))]
         needed = {places.present} if places.present is not None else set()
         needed |= {start} if starts_elsewhere else set()
         if not needed <= set(goals.tolist()) or not set(goals.tolist()) - needed:
             return None
         roadmap = TautRoadmap(
-            self._problem(points[goals], share),
+            tether_problem(points[goals]),
             max_classes=self.policy.max_classes,
             time_limit=clock.part(0.5),
         )
@@ -274,39 +306,46 @@ class _PlaneTour:
             )
         if home is None or (places.present is not None and begin is None):
             return None
-        found = _solve_tour(graph, place, self.places, home, begin, clock, seed)
-        if found is None:
-            return None
-        tour, is_optimal = found
-        ends = [home if begin is None else begin, *tour, home]
-        paths = [graph.path(u, v) for u, v in pairwise(ends)]
-        legs = [
+        robot_problem = self._problem(points[goals], share, touches=False)
+        legs = ClearanceLegs(graph, robot_problem, missing_cost=math.inf, clock=clock)
+        while True:
+            known = TravelGraph.from_costs(legs.costs, graph.cluster)
+            found = _solve_tour(known, place, self.places, home, begin, clock, seed)
+            if found is None:
+                return None
+            tour, is_optimal = found
+            ends = [home if begin is None else begin, *tour, home]
+            if not touches or not legs.raise_along(ends):
+                break
+        paths = [legs.path(u, v) for u, v in pairwise(ends)]
+        to_waypoints = [
             LegTo(int(places.waypoint[place[v]]), int(places.choice[place[v]]), path)
             for v, path in zip(tour, paths, strict=False)
         ]
-        return legs, paths[-1], is_optimal
+        return _PlaneLegs(to_waypoints, paths[-1], is_optimal and roadmap.complete)
 
-    def _problem(self, goals: Floats, share: float) -> Problem:
-        """Return the problem of the plane through some goals."""
+    def _problem(self, goals: Floats, share: float, touches: bool) -> Problem:
+        """Return the problem of the plane through some goals, without the robot's clearance if
+        paths touch the prisms."""
         mission, (obstacles, growth) = (
             self.context.mission,
             self.plan.obstacles(self.policy.corner_segments),
         )
         room = float(self.context.field.distance(np.vstack([goals, mission.anchor])).min())
         bounds = self.scene.bounds
+        clearance = max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room))
         return Problem(
             base=mission.anchor,
             obstacles=obstacles,
             goals=tuple(Goal(position=(x, y, z)) for x, y, z in goals.tolist()),
             tether_length=share * mission.tether_length,
-            clearance=growth + max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room)),
+            clearance=growth + (0.0 if touches else clearance),
             bounds=None if bounds is None else (bounds[0], bounds[1], bounds[3], bounds[4]),
         )
 
-    def _goals_in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
+    def _goals_in_reach(self, problem: Problem) -> Ints:
         """Return the indices of the goals that the tether reaches in some class."""
-        needed = shortest_tethers(self._problem(points[goals], share))
-        return np.flatnonzero(needed <= share * self.context.mission.tether_length)
+        return np.flatnonzero(shortest_tethers(problem) <= problem.tether_length)
 
     def _vertex(
         self, roadmap: TautRoadmap, graph: TravelGraph, is_at_place: Floats, line: Floats

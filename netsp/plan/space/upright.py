@@ -3,8 +3,9 @@
 Remove all other solids, and shrink these a little. No path and no tether gets longer by that, and a
 free tether stays free, so the shortest tour of the reduced scene bounds all tours. The reduced
 scene is a problem in the plane with heights. The exact roadmap and its solvers bound its tours over
-all homotopy classes of the tether. The proof, and which solids stand through all depths, is in
-docs/theory, Section 22.
+all homotopy classes of the tether. The robot keeps farther from solids than its tether, so its legs
+are longer than those of the tether's problem (`netsp.plan.space.clearance_legs`). The proof, and
+which solids stand through all depths, is in docs/theory, Section 22.
 """
 
 from __future__ import annotations
@@ -16,11 +17,20 @@ from netsp.base.errors import NetspError
 from netsp.base.geometry import polylines
 from netsp.model.bound_scope import Scope
 from netsp.model.problem import Circle, Polygon, Problem
-from netsp.plan.solve_problem import solve
+from netsp.plan.solve_problem import solve, solve_graph
+from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
+from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, PlanningContext
+from netsp.plan.space.planning_context import (
+    CLEARANCE_TOLERANCE,
+    DEPTH_TOLERANCE,
+    DIP_RATIO,
+    PlanningContext,
+)
 from netsp.plan.space.potential import BOUND_ROUNDING
+from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
 
 
@@ -73,7 +83,55 @@ def bound_by_upright_solids(
         return None  # no bound in the plane, so none in space
     if bound is None or bound.scope is not Scope.ALL_TOURS:
         return None
-    return bound.length * (1.0 - BOUND_ROUNDING)
+    with_room = None
+    if not clock.is_up:
+        points = np.vstack([problem.points, mission.start])
+        room = min(mission.clearance, float(context.field.distance(points).min()))
+        growth = dip + judged_room(room, mission.delta)
+        with_room = _bound_with_room(problem, growth, context.policy, clock)
+    return max(bound.length, with_room or 0.0) * (1.0 - BOUND_ROUNDING)
+
+
+def judged_room(room: float, delta: float) -> float:
+    """Return the least distance from solids of paths that the judge accepts for a robot that keeps
+    `room`, metres; negative if the paths may enter solids.
+
+    The judge samples paths (`netsp.plan.space.planning_context.keeps_clearance`), so solids may be
+    nearer by half a step between two samples.
+    """
+    return max(room - 0.5 * delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
+
+
+def _bound_with_room(
+    problem: Problem, growth: float, policy: MissionPolicy, clock: Clock
+) -> float | None:
+    """Return a lower bound on all tours of a problem whose robot keeps `growth` from the obstacles;
+    None if there are too many classes for it.
+
+    Solve for the shortest tour, measure its legs with the clearance, and solve again, until the
+    legs of the shortest tour are measured or the time is up.
+    """
+    try:
+        roadmap = TautRoadmap(
+            problem, max_classes=policy.bound.max_classes, time_limit=clock.part(0.5)
+        )
+        if not roadmap.complete:
+            return None
+        graph, robot_problem = (
+            roadmap.to_travel_graph(),
+            problem.model_copy(update={"clearance": growth}),
+        )
+        legs, best = ClearanceLegs(graph, robot_problem, clock=clock), 0.0
+        if graph.legs_left_out:
+            return None  # longer paths stand for them, which bound nothing
+        while True:
+            known = TravelGraph.from_costs(legs.costs, graph.cluster)
+            result = solve_graph(known, "auto", time_limit=clock)
+            best = max(best, result.lower_bound or 0.0)
+            if clock.is_up or result.tour is None or not legs.raise_along([*result.tour, 0]):
+                return best
+    except NetspError:
+        return None
 
 
 def upright_obstacles(context: PlanningContext, dip: float) -> list[Circle | Polygon]:
