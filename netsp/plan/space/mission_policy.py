@@ -257,6 +257,70 @@ class BoundPolicy:
 
 
 @dataclass(frozen=True)
+class ClassPolicy:
+    """Sizes and accuracy of a bound on all tours over classes.
+
+    Attributes
+    ----------
+    share
+        Share of the remaining time for this bound, from 0 to 1.
+    max_raise_ratio
+        Largest raise of a bound, as a share of it; more than 0.
+    max_halvings
+        How often the raise is halved for the first attempt. Each later attempt doubles it.
+    max_states
+        Maximum number of states of a travel graph. More states allow a higher bound and take more
+        time.
+    max_leg_windings, max_tether_windings
+        Maximum number of windings of a leg, and of a tether; each bar that is near takes three
+        times as many.
+    tolerance
+        Amount by which the bound on a detour may be less than it could be, metres; more than 0.
+    max_segments
+        Number of segments of bars and rings from which on no loops are searched for, which would
+        take more than seconds.
+    hub_samples
+        Number of points of a bar at which its depth in a box or half-space is measured.
+    max_tips
+        Number of cones tried for each loop. Crossings with a cone may be uncertain by rounding; a
+        loop without a certain cone is left out.
+    seed
+        Seed of the tips of cones, and of the moves of cores by which symmetric scenes become
+        generic.
+    """
+
+    share: float = 0.5
+    max_raise_ratio: float = 0.3
+    max_halvings: int = 6
+    max_states: int = 400
+    max_leg_windings: int = 243
+    max_tether_windings: int = 2187
+    tolerance: float = 2e-3
+    max_segments: int = 1500
+    hub_samples: int = 33
+    max_tips: int = 20
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        _check_shares(self, "share")
+        _check_minimum(
+            self,
+            max_halvings=0,
+            max_states=1,
+            max_leg_windings=1,
+            max_tether_windings=1,
+            max_segments=1,
+            hub_samples=2,
+            max_tips=1,
+            seed=0,
+        )
+        if not self.max_raise_ratio > 0.0:
+            raise InputError(f"max_raise_ratio: {self.max_raise_ratio}; expected more than 0")
+        if not self.tolerance > 0.0:
+            raise InputError(f"tolerance: {self.tolerance}; expected more than 0")
+
+
+@dataclass(frozen=True)
 class StateEffort:
     """Numbers of states, paths and detours per waypoint or leg.
 
@@ -523,7 +587,7 @@ class MissionPolicy:
     max_lifts
         Maximum number of times that the corners of a taut path are led around the outside of what
         they cut off.
-    words, gaps, orders, plane, states, times, detours, going_on, bound, potential
+    words, gaps, orders, plane, states, times, detours, going_on, bound, potential, classes
         Policies of the parts of planning.
     """
 
@@ -547,6 +611,7 @@ class MissionPolicy:
     going_on: GoingOnPolicy = GoingOnPolicy()
     bound: BoundPolicy = BoundPolicy()
     potential: PotentialPolicy = PotentialPolicy()
+    classes: ClassPolicy = ClassPolicy()
 
     def __post_init__(self) -> None:
         check_not_negative(self)

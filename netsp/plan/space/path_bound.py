@@ -7,8 +7,9 @@ The length of a path that was found, pulled taut or not, only says how far to lo
 a grid is no bound on other paths.
 
 These lengths ignore the tether. If a scene has upright solids, the plane's proof over all homotopy
-classes of the tether around them is a second bound (`netsp.plan.space.upright`). The result is the
-larger of the two bounds.
+classes of the tether around them is a second bound (`netsp.plan.space.upright`). If bars or rings
+form loops, a third bound counts how path and tether wind around them
+(`netsp.plan.space.class_bound`). The result is the largest bound.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.mission_policy import BoundPolicy, PotentialPolicy
+from netsp.plan.space.class_bound import WindingLegs, bound_by_windings, winding_graph, winding_legs
+from netsp.plan.space.mission_policy import BoundPolicy, ClassPolicy, PotentialPolicy
 from netsp.plan.space.planning_context import is_straight_clear
 from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
@@ -39,6 +41,7 @@ def bound_all_tours(
     seed: int = 0,
     policy: BoundPolicy | None = None,
     potential: PotentialPolicy | None = None,
+    classes: ClassPolicy | None = None,
 ) -> float | None:
     """Return a lower bound on the length of every tour through some waypoints.
 
@@ -58,6 +61,8 @@ def bound_all_tours(
         Time and accuracy; by default those of the context.
     potential : PotentialPolicy, optional
         Effort for each leg; by default that of the context.
+    classes : ClassPolicy, optional
+        Sizes and time of the bound by windings; by default those of the context.
 
     Returns
     -------
@@ -80,8 +85,22 @@ def bound_all_tours(
         clock.part(policy.upright_share),
     )
     legs = LegBounds(robot_paths, place_numbers, potential, policy)
-    without_tether = _bound_without_tether(legs, clock, seed)
-    return max(without_tether or 0.0, upright or 0.0) or None
+    classes = classes or defaults.classes
+    by_windings = None
+    if _has_one_place_each(legs) and len(place_numbers) > 1:
+        by_windings = winding_legs(robot_paths.context, legs.points, classes)
+    part = clock if by_windings is None else clock.part(1.0 - classes.share)
+    bounds = [upright or 0.0, _bound_without_tether(legs, part, seed) or 0.0]
+    if by_windings is not None:
+        bounds.append(_bound_with_windings(legs, by_windings, classes, clock, seed))
+    return max(bounds) or None
+
+
+def _has_one_place_each(legs: LegBounds) -> bool:
+    """Return whether tours begin at the start, and no waypoint has alternatives."""
+    places, numbers = legs.paths.places, legs.place_numbers
+    waypoints = set(places.waypoint[numbers].tolist())
+    return places.present is None and len(waypoints) == len(numbers)
 
 
 @dataclass
@@ -161,17 +180,24 @@ class LegBounds:
             self.final[u, v] = self.final[v, u] = True
         return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
 
+    def room(self, u: int, v: int) -> float:
+        """Return the least distance from solids of all paths that the judge accepts, metres.
+
+        It is negative for ends in solids.
+        """
+        mission = self.paths.context.mission
+        room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
+        return judged_room(room, mission.delta)
+
     def _region(self, u: int, v: int) -> Region:
         """Return the region of all legs that the judge accepts
         (`netsp.plan.space.planning_context.keeps_clearance`)."""
         mission, context = self.paths.context.mission, self.paths.context
-        room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
-        room = judged_room(room, mission.delta)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
         if context.bounds is not None:
             bounds = np.array(context.bounds).reshape(2, 3)
         anchor = np.asarray(mission.anchor, dtype=float)
-        return Region(room, bounds, anchor, mission.tether_length * (1.0 + 1e-6))
+        return Region(self.room(u, v), bounds, anchor, mission.tether_length * (1.0 + 1e-6))
 
     def _known_length(self, u: int, v: int) -> float:
         """Return the length of the shortest path found so far; infinite where there is none."""
@@ -217,3 +243,26 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
                 grown = legs.raise_bound(u, v, clock) or grown
         if not grown:
             return best or None
+
+
+def _bound_with_windings(
+    legs: LegBounds, windings: WindingLegs, policy: ClassPolicy, clock: Clock, seed: int
+) -> float:
+    """Return the bound that the lower bounds of legs and their windings prove; 0 without time.
+
+    As `_bound_without_tether`, raise the bounds of the legs of the shortest tour, and solve again.
+    """
+    best, count = 0.0, len(legs.points)
+    rooms = np.array([[legs.room(u, v) for v in range(count)] for u in range(count)])
+    while not clock.is_up:
+        graph = winding_graph(legs.paths.context, windings, legs.costs, rooms, policy, clock)
+        found, grown = bound_by_windings(graph, clock, seed), False
+        best = max(best, found.length)
+        while not grown and not all(legs.final[u, v] for u, v in found.legs):
+            for u, v in found.legs:
+                if clock.is_up:
+                    return best
+                grown = legs.raise_bound(u, v, clock) or grown
+        if not grown:
+            break
+    return best
