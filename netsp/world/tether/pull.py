@@ -185,7 +185,7 @@ def pull(
             # sidesteps again only if the last ones have shortened the strand
             last_length, length = length, strand_length(strand, count)
             came_off = False
-            if length < last_length - min_gain:
+            if settings.hold_friction == 0.0 and length < last_length - min_gain:
                 strand, count, came_off = sidestep_tips(field, strand, count, settings, room, steps)
             if came_off:
                 rounds, vain_rounds = max(rounds, done + 2), 0
@@ -285,16 +285,20 @@ def is_held(strand: Floats, i: int, before: float, after: float, settings: PullS
     pressed = -(fx * strand[i, NX] + fy * strand[i, NY] + fz * strand[i, NZ])
     force = math.sqrt(fx * fx + fy * fy + fz * fz)
     along = fx * strand[i, EX] + fy * strand[i, EY] + fz * strand[i, EZ]
-    sine = settings.max_cone_sine
+    sine, friction = settings.max_cone_sine, settings.hold_friction
     if strand[i, SHARP] == 1.0:
         across = math.sqrt(max(force * force - along * along, 0.0))
         is_pressed = pressed > settings.min_sharp_pressed_share * force
-        return bool(is_pressed and pressed > (strand[i, CONE] - sine) * across)
+        # friction widens the cone by its angle
+        cosine = strand[i, CONE] - friction * math.sqrt(max(1.0 - strand[i, CONE] ** 2, 0.0))
+        cosine /= math.sqrt(1.0 + friction * friction)
+        return bool(is_pressed and pressed > (cosine - sine) * across)
     if not pressed > settings.min_pressed_share * force:
         return False
     if strand[i, CONE] == 0.0:
         return True
-    return bool(strand[i, CONE] * along <= (-sine if strand[i, PART] >= 0.0 else sine) * force)
+    pull_off = strand[i, CONE] * along - friction * pressed
+    return bool(pull_off <= (-sine if strand[i, PART] >= 0.0 else sine) * force)
 
 
 @kernel
@@ -417,7 +421,29 @@ def length_derivatives(
         diagonal[k] -= min(bend, settings.max_convex_share * diagonal[k])
         # a contact that is met head on cannot slide: a small weight keeps the system regular
         diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
+    if settings.hold_friction > 0.0:
+        resist_sliding(slope, diagonal, beside, pressing, settings.hold_friction)
     return slope, diagonal, beside, around
+
+
+@kernel
+def resist_sliding(
+    slope: Floats, diagonal: Floats, beside: Floats, pressing: Floats, friction: float
+) -> None:
+    """Reduce the pull along the slide directions by friction, in place.
+
+    A contact that friction holds gets no pull, and no neighbour moves it.
+    """
+    for k in range(len(slope)):
+        resistance = friction * max(pressing[k], 0.0)
+        if abs(slope[k]) > resistance:
+            slope[k] -= math.copysign(resistance, slope[k])
+            continue
+        slope[k], diagonal[k] = 0.0, 1.0
+        if k > 0:
+            beside[k - 1] = 0.0
+        if k < len(beside):
+            beside[k] = 0.0
 
 
 @kernel

@@ -101,6 +101,10 @@ class TetherPolicy:
     min_piece
         Minimum length of the pieces of a strand whose directions count for its turning, in units of
         delta. Shorter pieces between contacts not yet at rest may point anywhere.
+    hold_friction
+        Coefficient of friction with which contacts resist sliding sideways. A contact slides only
+        if the pull along its slide direction exceeds this share of what presses it, and a rim
+        releases the strand later by the same angle. 0 is the taut tether without friction.
     """
 
     min_pressed_share: float = 0.5
@@ -130,6 +134,7 @@ class TetherPolicy:
     min_mend_gain: float = 1e-4
     max_crumpled_ratio: float = 1.1
     min_piece: float = 0.3
+    hold_friction: float = 0.0
 
     def __post_init__(self) -> None:
         check_not_negative(self)
@@ -184,6 +189,7 @@ class PullSettings(NamedTuple):
     min_mend_gain: float
     max_crumpled_ratio: float
     min_piece: float
+    hold_friction: float
 
 
 def pull_settings(
