@@ -123,6 +123,12 @@ def _flown(
                 from netsp.plan.space.flown import words_of_flight
 
                 run.summary["words"] = words_of_flight(run, scene=scene, field=field).to_summary()
+            if run.summary["status"] == "done":
+                from netsp.plan.space.run_bracket import bracket_run
+
+                run.summary["bracket"] = clock.bounded(
+                    "comparing tethers that hold", partial(bracket_run, run, scene, field)
+                )
             if not args.quiet:
                 new_line = "\r\n" if sys.stderr.isatty() else ""
                 print(new_line + describe_run(run, scene.units), file=sys.stderr)

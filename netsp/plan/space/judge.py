@@ -24,12 +24,12 @@ from netsp.model.solution import Status
 from netsp.plan.space.planning_context import PlanningContext, keeps_clearance, min_clearance_along
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.mission.planned_tour import PlannedTour
 from netsp.world.paths.tree import ShortestTree
 from netsp.world.planner.planner_policy import PlannerPolicy
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
-from netsp.world.tether import GeodesicTether
 
 STATED_TOLERANCE = 1e-6
 """Tolerance of stated figures, for their rounding in files: metres, and share of a length."""
@@ -103,7 +103,7 @@ def verify_mission(
         check_bounds(mission, scene)
         context = PlanningContext.for_mission(mission, scene, field or scene.field())
     policy = policy or JudgePolicy()
-    finer = GeodesicTether(context.field, policy.delta_ratio * mission.delta)
+    finer = mission_tether(mission, context.field, policy.delta_ratio)
     context = replace(context, mission=mission, model=finer)
     return Verification(tuple(_Judge(mission, mission.tour, context, policy).run()))
 

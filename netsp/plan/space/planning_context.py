@@ -29,6 +29,7 @@ from netsp.plan.space.word_search import (
     shortest_words,
 )
 from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.mission.planned_tour import UnresolvedGap
 from netsp.world.paths.standoff import move_off_surfaces
 from netsp.world.paths.tree import OPEN as ALL_FREE
@@ -134,7 +135,7 @@ class PlanningContext:
             tolerance=DIP_RATIO * mission.delta,
             policy=policy.words,
         )
-        model = GeodesicTether(field, mission.delta)
+        model = mission_tether(mission, field)
         return cls(mission, field, grid, words, model, bounds, policy=policy)
 
     @property

@@ -19,13 +19,14 @@ from netsp.hsignature.words import least_changed
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.space_signature import SpaceSignature
 from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.scene import Scene
 from netsp.world.side_names import AXES, beside
 from netsp.world.simulator.laid_tether import present_tether
 from netsp.world.simulator.mission_run import mission_grid
-from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether import Tether
 from netsp.world.world_policy import WorldPolicy
 from netsp.world.world_protocol import Letters
 
@@ -126,7 +127,7 @@ class SpaceWorld:
         self.tether_length = mission.tether_length
         self.anchor = np.asarray(mission.anchor, dtype=float)
         self.field = field or self.scene.field()
-        self.model = GeodesicTether(self.field, mission.delta)
+        self.model = mission_tether(mission, self.field)
         self._missed: dict[Word, Floats] = {}
 
     @cached_property

@@ -26,9 +26,10 @@ from netsp.plan.space.planning_context import drive_step, is_straight_clear
 from netsp.plan.space.states import hang_alike
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.paths.tree import Grid, ShortestTree, pull_taut
 from netsp.world.scene.field import DistanceField
-from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether import Tether
 
 
 @dataclass
@@ -163,7 +164,7 @@ def _shortest_tethers(
     mission: Mission, field: DistanceField, grid: Grid, clock: Clock, policy: MissionPolicy
 ) -> _Classes:
     """Return the shortest tether to each waypoint that one reaches."""
-    model, points = GeodesicTether(field, mission.delta), mission.places
+    model, points = mission_tether(mission, field), mission.places
     limit = policy.tether_share * mission.tether_length
     tree = ShortestTree(grid, np.array(mission.anchor), points)
     found = _Classes([], [])
@@ -189,7 +190,7 @@ def _drive_straight_legs(
 ) -> dict[tuple[int, int], float]:
     """Drive each tether straight to the neighbours of its waypoint, add the classes in which it
     arrives, and return the lengths of the legs, metres."""
-    model, points = GeodesicTether(field, mission.delta), mission.places
+    model, points = mission_tether(mission, field), mission.places
     limit = policy.tether_share * mission.tether_length
     step = drive_step(mission, policy.tether_share)
     legs: dict[tuple[int, int], float] = {}

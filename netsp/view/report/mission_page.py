@@ -171,7 +171,9 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
         "tether planned (m)",
         "most on the way (m)",
     ]
+    hanging = {int(b["waypoint"]): b for b in (summary.get("bracket") or {}).get("stops", ())}
     head += ["tether flown (m)", "as planned"] if summary else []
+    head += ["at least – at most (m)"] if hanging else []
     head.append("word")
     rows = []
     for k, w in enumerate(mission.waypoints):
@@ -192,6 +194,9 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
             same = words.get(k, {}).get("as_planned")
             row.append("–" if same is None else "yes" if same else "no")
             word = words[k]["signature"] if k in words else word
+        if hanging:
+            b = hanging.get(k)
+            row.append("–" if b is None else f"{b['at_least']:.4g} – {b['at_most']:.4g}")
         row.append("–" if word is None else json.dumps(word))
         rows.append(row)
     last = len(head) - 1
@@ -199,6 +204,12 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
         '<p class="note">A word tells the class of the tether in the letters of this mission; '
         "[] is the class of the shortest way from the anchor.</p>"
     )
+    if hanging:
+        note += (
+            '<p class="note">At least – at most: where the tether hangs on the end of something, '
+            "it may slip off earlier or later. The column shows its length if it slips at once, "
+            f"and if friction of {summary['bracket']['hold_friction']:g} holds it.</p>"
+        )
     return briefing.table(head, rows, (2, last)) + note
 
 

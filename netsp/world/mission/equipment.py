@@ -55,7 +55,10 @@ class TetherPhysics(Model):
     ] = 10.0
     friction: Annotated[
         Annotated[NonNegative, Field(le=10.0)],
-        Field(description="coefficient of friction at contacts"),
+        Field(
+            description="coefficient of friction at contacts; above 0, lengths of the tether are "
+            "those if friction holds it on the ends of solids"
+        ),
     ] = 0.0
     max_tension_ratio: Annotated[
         Annotated[Number, Field(gt=1.0, le=1e6)] | None,

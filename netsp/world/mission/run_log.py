@@ -243,6 +243,7 @@ def describe_run(run: Run, units: str) -> str:
             f"time     {s['inspection_s']:.1f} s{_time_home(s['home'])}",
             f"home     {_home(s['home'], units)}",
             *_tether_lines(s, units),
+            *_bracket_lines(s, units),
             *_class_lines(s.get("words")),
             *_event_lines(s),
             *_left_out_lines(s),
@@ -273,6 +274,25 @@ def _tether_lines(s: dict[str, Any], units: str) -> list[str]:
         f"{1e3 * s['replan_worst_s']:.0f} ms"
     )
     return [*lines, planning]
+
+
+def _bracket_lines(s: dict[str, Any], units: str) -> list[str]:
+    """Return a line about a tether that may hang otherwise, if friction may hold it."""
+    bracket = s.get("bracket")
+    if not bracket or not (bracket["stops"] or bracket["over_s"]):
+        return []
+    line = (
+        f"hangs    at most {bracket['longest']:.3f} {units} if friction holds it, over the limit "
+        f"for {bracket['over_s']:.1f} s"
+    )
+    if not bracket["stops"]:
+        return [line]
+    widest = max(bracket["stops"], key=lambda b: b["at_most"] - b["at_least"])
+    return [
+        f"{line}; differs at {len(bracket['stops'])} waypoints, most at "
+        f"#{_given(s, widest['waypoint'])}: {widest['at_least']:.2f} to {widest['at_most']:.2f} "
+        f"{units}"
+    ]
 
 
 def _class_lines(words: dict[str, Any] | None) -> list[str]:

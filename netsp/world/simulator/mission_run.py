@@ -17,6 +17,7 @@ from netsp.base.registry import blame_plugins
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission, MissionWaypoint
 from netsp.world.mission.mission_limits import check_bounds, check_names, check_size, check_tether
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.mission.run_log import LogRow, Run
 from netsp.world.paths.path_policy import PathPolicy
 from netsp.world.paths.tree import Grid
@@ -35,7 +36,7 @@ from netsp.world.simulator.stalls import Stalls
 from netsp.world.simulator.summary import summarise
 from netsp.world.simulator.surprises import SceneSurprises
 from netsp.world.simulator.surroundings import Surroundings
-from netsp.world.tether import TETHERS, GeodesicTether, make_tether
+from netsp.world.tether import TETHERS, make_tether
 from netsp.world.vehicle import VEHICLES, VehicleFactory, make_vehicle
 from netsp.world.vehicle.kinematic import wrapped_angle
 
@@ -151,7 +152,7 @@ def simulate(
     check_bounds(mission, scene)
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
-    tethers = GeodesicTether(field, mission.delta)
+    tethers = mission_tether(mission, field)
     grid = mission_grid(mission, scene, field, options.policy.paths)
     laid = first_tether(mission, field, tethers, grid)
     taut = present_tether(mission, field, tethers, grid)

@@ -21,6 +21,7 @@ from netsp.world.simulator.sensing import Positions
 from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import Load, payout, pull_on_robot, turning
+from netsp.world.tether.tether_bracket import taut_length
 from netsp.world.vehicle import Vehicle
 
 
@@ -132,7 +133,7 @@ class Simulation:
             self.vehicle.yaw,
             planner.index,
             command.mode,
-            self.tether.length,
+            taut_length(self.tether),
             out,
             turning(self.tether, self.tethers.delta),
             seen.share if seen else 0.0,

@@ -14,6 +14,7 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.world.mission.mission import Mission
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.planner import Planner
 from netsp.world.scene.field import DistanceField, pushed_out
 from netsp.world.scene.grid import VoxelGrid
@@ -160,7 +161,7 @@ class Surroundings:
         if self.solids is before:
             return False
         world.scene = self._field(self.solids)
-        world.tethers = GeodesicTether(world.scene, self.mission.delta)
+        world.tethers = mission_tether(self.mission, world.scene)
         world.tether = world.tethers.refine(world.tether)
         if self.ranging is None:
             self.mapped = self.solids
@@ -302,7 +303,7 @@ class Surroundings:
     def _update_planner(self, world: Simulation, planner: Planner, box: Floats) -> None:
         """Give the planner its map, and the tether in it."""
         known = self._field(self.mapped)
-        world.model = GeodesicTether(known, self.mission.delta)
+        world.model = mission_tether(self.mission, known)
         world.believed = self._recover_tether(world, world.model)
         planner.update_map(known, world.model, box, world.vehicle.position, world.believed)
 
