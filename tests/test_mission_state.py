@@ -223,6 +223,18 @@ def test_a_waypoint_that_a_solid_stands_on_is_left_out_and_the_others_are_visite
     assert s["home"]["tether_free"]
 
 
+def test_a_waypoint_of_a_tour_is_visited_after_the_solid_on_it_has_gone(planned):
+    blocked = appear(planned[0].waypoints[2].position, 0.4, 0.5)
+    left_out_s = next(r.time for r in fly(planned, blocked).log if r.waypoint == 4)
+    gone = {"time": left_out_s + 1.0, "vanish": "new"}
+    run = fly(planned, events(blocked.events[0].model_dump(exclude_none=True), gone))
+    s = run.summary
+    assert s["visited"] == s["waypoints"] == 4
+    assert s["left_out"] == []
+    assert s["home"]["tether_free"]
+    assert s["exceedance_s"] == 0.0
+
+
 def test_where_the_order_no_longer_holds_the_rest_is_planned_anew(planned, monkeypatch):
     """Without ways round what blocks a leg there is only another tour."""
     monkeypatch.setattr(RepairPlanner, "_path_around", lambda *_: None)

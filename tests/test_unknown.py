@@ -139,8 +139,47 @@ def test_what_has_gone_or_moved_comes_off_the_map():
 def test_a_solid_waits_until_there_is_room_for_it():
     on_the_tether = {"post": {"center": [-3, -5.5], "radius": 0.3}}
     run = fly([{"time": 0, "appear": on_the_tether}], {}, waypoints=[(-2.5, -5, 0)])
-    assert run.summary["surprises"] == {"happened": 0, "held_back": 1, "found": 0}
+    counts = {"happened": 0, "held_back": 1, "found": 0, "events": []}
+    assert run.summary["surprises"] == counts
     assert "had no room" in describe_run(run, "m")
+
+
+ON_A_WAYPOINT = {"name": "crate", "box": {"center": [3, 1.5, -2], "size": [1, 1, 1]}}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"vanish": "crate"}, {"move": {"solid": "crate", "by": [0, 0, -3]}}],
+    ids=["vanishes", "moves"],
+)
+def test_a_waypoint_is_visited_once_nothing_stands_on_it_any_more(change):
+    events = [{"time": 0, "appear": ON_A_WAYPOINT}, {"time": 25, **change}]
+    run = fly(events, tether_length=30.0)
+    assert run.summary["visited"] == run.summary["waypoints"] == len(AMONG)
+    assert run.summary["left_out"] == []
+    assert any(math.dist((r.x, r.y, r.z), AMONG[0]) <= run.mission.reach for r in run.log)
+    assert [e["number"] for e in run.summary["surprises"]["events"]] == [0, 1]
+    assert run.summary["surprises"]["events"][1]["time"] == pytest.approx(25.0, abs=0.2)
+
+
+def test_a_waypoint_is_tried_again_with_a_longer_tether():
+    # 14 m are too short for two waypoints, 20 m are not
+    run = fly([{"time": 20, "tether_length": 20.0}], tether_length=14.0)
+    short = fly([], tether_length=14.0)
+    assert [left["waypoint"] for left in short.summary["left_out"]] == [1, 2]
+    assert run.summary["visited"] == run.summary["waypoints"] == len(AMONG)
+    assert kept(run)
+
+
+def test_a_waypoint_that_was_cancelled_is_not_tried_again():
+    events = [
+        {"time": 0, "appear": ON_A_WAYPOINT},
+        {"time": 25, "vanish": "crate"},
+        {"time": 26, "cancel_waypoint": 0},
+    ]
+    run = fly(events, tether_length=30.0)
+    assert run.summary["visited"] == 3
+    assert all(math.dist((r.x, r.y, r.z), AMONG[0]) > run.mission.reach for r in run.log)
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,8 @@ class RepairPlanner(PredictivePlanner):
     _walked_on_leg: list[Floats] = field(default_factory=list)
     # number of the waypoint to which a repaired leg leads, and its path from where it was repaired
     _first_leg: tuple[int, Floats] | None = None
-    _has_new_waypoint: bool = False
+    # reason for a new plan that visits more waypoints than the tour; None if there is none
+    _more_to_visit: str | None = None
     # mission in the order of its file
     _as_given: Mission | None = None
 
@@ -151,7 +152,17 @@ class RepairPlanner(PredictivePlanner):
     def add_waypoint(self, waypoint: MissionWaypoint) -> None:
         """See `Planner`."""
         super().add_waypoint(waypoint)
-        self._must_check = self._has_new_waypoint = self.mission.tour is not None
+        if self.mission.tour is not None:
+            self._must_check = True
+            self._more_to_visit = f"waypoint #{max(self.given)} was added"
+
+    def try_left_out_again(self) -> None:
+        """See `Planner`."""
+        if self.left_out and not self.is_done and self.mission.tour is not None:
+            numbers = ", ".join(f"#{self.given[k]}" for k, _ in self.left_out)
+            self._must_check = True
+            self._more_to_visit = f"waypoints that were left out may be in reach now: {numbers}"
+        super().try_left_out_again()
 
     def _drop_visit(self, k: int) -> None:
         """Join the legs before and after a visit that is left out, pulled taut in their class."""
@@ -195,15 +206,15 @@ class RepairPlanner(PredictivePlanner):
         rest = self._remaining_tour(robot, tether)
         if rest is None:
             return
-        if self._has_new_waypoint:
-            rest.reason = f"waypoint #{max(self.given)} was added"
+        if self._more_to_visit is not None:
+            rest.reason = self._more_to_visit
         if rest.reason is None:
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
         min_worthwhile_length = (
             rest.planned_length + self.options.planning_limit * self.mission.speed
         )
-        added, self._has_new_waypoint = self._has_new_waypoint, False
+        added, self._more_to_visit = self._more_to_visit is not None, None
         is_worthwhile = added or not rest.is_complete or rest.length > min_worthwhile_length
         is_worthwhile &= not self.is_homeward
         response, chosen = choose_repair(

@@ -356,9 +356,11 @@ def _event_lines(s: dict[str, Any]) -> list[str]:
 
 def _left_out_lines(s: dict[str, Any]) -> list[str]:
     """Return lines about the first stalls, and the first waypoints left out."""
+    # more than `waypoints` if some were tried again
+    n_flown = len(s.get("given_as") or range(s["waypoints"]))
     lines = [
         f"stalled  at {stall['time']:.1f} s, on the way "
-        + ("home" if stall["waypoint"] == s["waypoints"] else f"to waypoint #{stall['waypoint']}")
+        + ("home" if stall["waypoint"] == n_flown else f"to waypoint #{stall['waypoint']}")
         for stall in s["stalls"][:5]
     ]
     lines += [

@@ -227,7 +227,8 @@ class Planner:
         int or None
             The waypoint's present number; None if the robot has been there.
         """
-        k = self.given.index(number) if number in self.given else -1
+        # a waypoint that was left out and is tried again occurs twice
+        k = max((k for k, given in enumerate(self.given) if given == number), default=-1)
         if k < self.index or self.is_done:
             return None
         del self.given[k]
@@ -238,8 +239,30 @@ class Planner:
         return k
 
     def update_limit(self, limit: float) -> None:
-        """Set the limit of the tether, metres, from now on."""
+        """Set the limit of the tether, metres, from now on.
+
+        With a longer tether, waypoints that were left out are tried again.
+        """
+        is_longer = limit > self.mission.tether_length
         self.mission = self.mission.model_copy(update={"tether_length": limit})
+        if is_longer:
+            self.try_left_out_again()
+
+    def try_left_out_again(self) -> None:
+        """Visit the waypoints that were left out after all others, because the map or the limit has
+        changed to their advantage.
+
+        They keep the numbers that they were given. Nothing happens once the robot is home.
+        """
+        if self.is_done or not self.left_out:
+            return
+        again = [k for k, _ in self.left_out]
+        if self.is_homeward:
+            self.path, self.mode = self.path[:0], NORMAL
+        self.left_out = []
+        self.given += [self.given[k] for k in again]
+        waypoints = (*self.mission.waypoints, *(self.mission.waypoints[k] for k in again))
+        self.mission = self.mission.model_copy(update={"waypoints": waypoints})
 
     def on_push(self) -> None:
         """Forget the path, because the robot was carried off it."""

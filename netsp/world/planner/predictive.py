@@ -133,6 +133,12 @@ class PredictivePlanner(Planner):
         super().add_waypoint(waypoint)
         self._planned = -1
 
+    def try_left_out_again(self) -> None:
+        """See `Planner`."""
+        if self.left_out and self.is_homeward and not self.is_done:
+            self._planned = -1
+        super().try_left_out_again()
+
     def cancel_waypoint(self, number: int) -> int | None:
         """See `Planner`; drop the tour, because its legs lead to other waypoints."""
         k = super().cancel_waypoint(number)

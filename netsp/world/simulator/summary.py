@@ -71,7 +71,7 @@ def summarise(
         "shortening_s": step_s * sum(r.shortening for r in log),
         "friction": _friction(mission, turnings, step_s),
         "visited": len(planner.reached),
-        "waypoints": len(mission.waypoints),
+        "waypoints": len(set(planner.given)),
         "contacts": world.contacts,
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
         "stops": _stops(mission, planner, log),

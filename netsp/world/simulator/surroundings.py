@@ -8,6 +8,7 @@ sensor, the planner learns of each change at once.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -98,6 +99,7 @@ class Surroundings:
         self.sightings: list[Sighting] = []
         self.found: set[str | int] = set()
         self.due = surprises.by_time()
+        self.events = surprises.events
         self.happened: list[tuple[float, SceneEvent]] = []
         self.trail = np.array(places)
         self.moments: list[tuple[Floats, int]] = []
@@ -116,6 +118,8 @@ class Surroundings:
         self._steps += 1
         if has_changed:
             self._update_planner(world, planner, self._changed_box(before))
+            if any(all(solid is not kept for kept in self.mapped) for solid in before):
+                planner.try_left_out_again()  # a solid that has gone may have been in the way
         if world.believed is not None:
             excess = payout(world.tether, world.load) - payout(world.believed, world.load)
             is_recalled = self._steps % self.policy.recall_steps == 0
@@ -346,11 +350,13 @@ class Surroundings:
         """Scene with the current solids."""
         return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
-    def summary_fields(self) -> dict[str, int]:
+    def summary_fields(self) -> dict[str, Any]:
         """Return the numbers of events, of events that never had room, and of solids that the
-        sensor added to the map."""
+        sensor added to the map, and when each event happened, in the order in which they did."""
+        number = {id(event): k for k, event in enumerate(self.events)}
         return {
             "happened": len(self.happened),
             "held_back": len(self.due),
             "found": len(self.found),
+            "events": [{"number": number[id(e)], "time": time} for time, e in self.happened],
         }
