@@ -71,7 +71,7 @@ def tiny_worlds(draw, max_goals=5):
 # proofs and optima
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(problem=tiny_worlds())
 def test_an_optimum_is_certified_and_nothing_above_it(problem):
     """The optimum is proven up to 1e-6, and no more than the brute force over the exact travel
@@ -86,7 +86,7 @@ def test_an_optimum_is_certified_and_nothing_above_it(problem):
     assert solution.length == pytest.approx(optimum, rel=1e-9)
     assert certificate.level == "optimal", certificate.reason
     assert optimum * (1.0 - 1e-6) <= certificate.bound <= optimum
-    for share in (1e-5, 0.01, 1.0):
+    for share in (1e-5, 1.0):
         longer = solution.model_copy(update={"length": solution.length * (1.0 + share)})
         raised = certify(problem, longer, policy=CertifyPolicy(corners=(48,)))
         assert raised.level != "optimal"
@@ -120,7 +120,7 @@ def test_the_cover_holds_all_classes_of_the_travel_graph(problem):
     assert sorted(found) == list(range(len(graph.signatures)))
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None, derandomize=True)
 @given(problem=tiny_worlds())
 def test_bounds_on_legs_are_below_the_exact_legs_and_rise_with_effort(problem):
     """For each leg: effort 0 <= effort 1 <= effort 2 <= exact length."""
@@ -129,7 +129,7 @@ def test_bounds_on_legs_are_below_the_exact_legs_and_rise_with_effort(problem):
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_bounds_on_legs_are_nearly_exact(family, seed):
     """In worlds of obstacles that are not merged, the bound of effort 2 is the exact length of
     legs up to 1e-6."""
@@ -138,7 +138,7 @@ def test_bounds_on_legs_are_nearly_exact(family, seed):
     assert check_legs(instance, graph, unit) < 1e-6
 
 
-MAX_LEGS = 80
+MAX_LEGS = 40
 """Legs of one world that are compared; of more, some are left out."""
 
 

@@ -140,7 +140,7 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
     mission = Mission.load(file)
     scene = mission.load_scene()
     context = PlanningContext.for_mission(mission, scene, scene.field())
-    words, most, longest = context.words, 3, 7.0
+    words, most, longest = context.words, 3, 6.0
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = context.search_words(False, root, most, longest)
     limit = int(100 * 1.35 * longest / 0.4)

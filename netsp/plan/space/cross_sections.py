@@ -149,7 +149,7 @@ def _section(
                 return False, None
         else:
             cap = _height_in_cap((a[2], b[2]), depths, lean * radius)
-            if 0.0 < cap and within <= cap:
+            if cap > 0.0 and within <= cap:
                 return False, None
         middle = a + (depths.middle - a[2]) / (b[2] - a[2]) * (b - a)
         # a cap of the capsule is narrowest at the end of the range

@@ -151,8 +151,8 @@ class PlanePolicy:
     Attributes
     ----------
     max_classes
-        Maximum number of augmented goals, at least 1; if there are more, those with the shortest
-        tethers are kept.
+        Maximum number of augmented goals, at least 1; if there are more, the solvers search for a
+        tour without a list of them.
     max_s
         Seconds for each tour, more than 0; the limit also holds for runs without a time limit.
     time_share
@@ -165,7 +165,7 @@ class PlanePolicy:
         measured as a polyline; from 0 to 1.
     """
 
-    max_classes: int = 1000
+    max_classes: int = 2000
     max_s: float = 15.0
     time_share: float = 0.6
     corner_segments: int = 4

@@ -20,10 +20,12 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import InfeasibleError, InputError, LimitReachedError
+from netsp.base.geometry import polylines
+from netsp.hsignature import concatenate, invert
 from netsp.hsignature.rays import signature
 from netsp.model.problem import Circle, Goal, Polygon, Problem
 from netsp.model.solution import Status
-from netsp.plan.solve_problem import solve_graph
+from netsp.plan.solve_problem import solve, solve_graph
 from netsp.plan.space.board import DrivenTour
 from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.driven_legs import LegTo, drive_legs
@@ -32,6 +34,7 @@ from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
+from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
@@ -292,6 +295,11 @@ class _PlaneTour:
             max_classes=self.policy.max_classes,
             time_limit=clock.part(0.5),
         )
+        if not roadmap.complete and self._is_whole:
+            # among the classes of the shortest tethers alone there are no short tours
+            return (
+                None if touches else self._searched_legs(goals[goals < start], share, clock, seed)
+            )
         graph = roadmap.to_travel_graph()
         place = np.r_[-1, goals][graph.cluster]
         home = (
@@ -323,6 +331,43 @@ class _PlaneTour:
             for v, path in zip(tour, paths, strict=False)
         ]
         return _PlaneLegs(to_waypoints, paths[-1], is_optimal and roadmap.complete)
+
+    @property
+    def _is_whole(self) -> bool:
+        """Return whether the mission begins at its start, and no waypoint has alternatives."""
+        return self.places.present is None and not self.places.choice.any()
+
+    def _searched_legs(
+        self, goals: Ints, share: float, clock: Clock, seed: int
+    ) -> _PlaneLegs | None:
+        """Return the legs of the best tour of `netsp.plan.solve_problem.solve`, which needs no list
+        of all classes.
+
+        The problem begins at the start of the mission. Its tether is shorter by the tether that is
+        laid from the anchor to the start, so a tether that it allows is within its share.
+        """
+        context, points = self.context, self.places.points[goals]
+        laid = float(polylines.length(context.start_tether.nodes))
+        problem = self._problem(points, share, touches=False)
+        problem = problem.model_copy(
+            update={"base": context.mission.start, "tether_length": problem.tether_length - laid}
+        )
+        if not problem.tether_length > 0.0:
+            return None
+        solution = solve(problem, time_limit=clock, seed=seed)
+        if not solution.tour:
+            return None
+        paths = TautPaths(problem)
+        ends = [(0, ()), *((visit.goal + 1, visit.signature) for visit in solution.tour), (0, ())]
+        legs = [
+            paths.path(a, b, concatenate(invert(before), after))
+            for (a, before), (b, after) in pairwise(ends)
+        ]
+        to_waypoints = [
+            LegTo(int(self.places.waypoint[goals[goal - 1]]), 0, path)
+            for (goal, _), path in zip(ends[1:], legs[:-1], strict=False)
+        ]
+        return _PlaneLegs(to_waypoints, legs[-1], solution.status is Status.OPTIMAL)
 
     def _problem(self, goals: Floats, share: float, touches: bool) -> Problem:
         """Return the problem of the plane through some goals, without the robot's clearance if
