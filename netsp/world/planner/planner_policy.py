@@ -56,6 +56,8 @@ class PredictivePolicy:
     anchor_lag_s
         Time by which a robot may be late while the anchor moves, s. The distance that the anchor
         moves in that time is kept in reserve as tether.
+    rest_check_s
+        Time between two checks that the tether still fits on the rest of a path, s.
     unmapped_reserve
         Tether kept in reserve while a range sensor may find solids, metres.
     snag_tolerance
@@ -84,6 +86,7 @@ class PredictivePolicy:
     release_rounds: int = 60
     anchor_check_s: float = 2.0
     anchor_lag_s: float = 3.0
+    rest_check_s: float = 0.5
     unmapped_reserve: float = 0.2
     snag_tolerance: float = 0.1
     home_check_steps: int = 20

@@ -49,6 +49,8 @@ class PredictivePlanner(Planner):
     _preview_count: int = 0
     _previewed_length: float = 0.0
     _checked: float = 0.0
+    _rest_checked: float = 0.0
+    _is_retreating: bool = False
     _previous_excess: float = 0.0
     _candidates: list[Candidate] = field(default_factory=list)
 
@@ -66,15 +68,17 @@ class PredictivePlanner(Planner):
             and len(self.path)
             and not self._has_used_half_reserve(tether)
             and not self._is_overtaken(robot, tether)
+            and not self._is_longer_than_planned(robot, tether)
         ):
             return False
         retreat = None if self.is_anchor_moving else self._path_to_shorten(tether)
         if retreat is not None:
             is_gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
-            if not len(self.path) or is_gone:
-                self.path, self.mode = retreat[1:], RECOVERY
+            if not self._is_retreating or not len(self.path) or is_gone:
+                self.path, self.mode, self._is_retreating = retreat[1:], RECOVERY, True
                 return True
             return False
+        self._is_retreating = False
         first = self._planned != self.index
         self._planned, self._checked = self.index, self.now
         limit = self.limit
@@ -217,6 +221,21 @@ class PredictivePlanner(Planner):
         self._checked = self.now
         limit = self.limit + 0.5 * self._anchor_reserve
         return self.mode == WAIT or not self._fits(tether, np.vstack([robot, self.path]), limit)
+
+    def _is_longer_than_planned(self, robot: Floats, tether: Tether) -> bool:
+        """Return whether the tether no longer fits on the rest of the path.
+
+        A tether may hang on an edge that it slips off in the plan, for example because the vehicle
+        is beside its path. The check runs at intervals, and only where the limit is in reach: a
+        tether grows by at most the length of the rest.
+        """
+        if self.is_anchor_moving or self.now < self._rest_checked + self.predictive.rest_check_s:
+            return False
+        self._rest_checked = self.now
+        rest, limit = np.vstack([robot, self.path]), self.limit
+        if not self.has_load and tether.length + polylines.length(rest) <= limit:
+            return False
+        return not self._fits(tether, rest, limit)
 
     def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
         """Wait for an anchor that comes nearer.
