@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import netsp.plan.space.mission_solver
+import netsp.plan.space.mission_flights
+import netsp.plan.space.space_legs
 import netsp.plan.space.space_plan
 from netsp import Problem, solve
 from netsp.base.clock import Clock
@@ -69,7 +70,7 @@ def square_board(square_water) -> StateGraph:
     places = Places.for_mission(square_water.mission, square_water.field)
     states = find_first_states(square_water, places, 8.9, StatePolicy().effort(3), Clock())
     board = StateGraph(square_water, states)
-    board.update(netsp.plan.space.space_plan.StateGrowth(states, None).legs, Clock())
+    board.update(netsp.plan.space.space_legs.StateGrowth(states, None).legs, Clock())
     return board
 
 
@@ -129,7 +130,7 @@ def test_where_all_other_tours_are_refused_the_one_out_and_back_is_given(monkeyp
 @pytest.mark.parametrize("seconds", [1e-3, 6.0])
 def test_what_the_judge_refuses_is_never_given(seconds, monkeypatch):
     refuse = Verification((Check("no", False, "refused"),))
-    for module in (netsp.plan.space.space_plan, netsp.plan.space.mission_solver):
+    for module in (netsp.plan.space.space_plan, netsp.plan.space.mission_flights):
         monkeypatch.setattr(module, "verify_mission", lambda *_, **__: refuse)
     with pytest.raises(LimitReachedError):
         solve_mission(mission_about(BESIDE[:2]), scene=SQUARE, time_limit=seconds)

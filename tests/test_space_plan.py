@@ -21,7 +21,8 @@ from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.space_legs import DrivenLegs, RobotPaths
-from netsp.plan.space.space_plan import _best_driven, plan
+from netsp.plan.space.space_plan import plan
+from netsp.plan.space.state_search import _best_driven
 from netsp.plan.space.states import find_first_states
 from netsp.plan.space.triangle_labels import (
     LENGTHS,
@@ -324,7 +325,7 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
     scene, mission = A_BAR, Mission.model_validate(BESIDE_A_BAR)
     found = plan(mission, scene=scene)
     assert verify_mission(found.to_mission(), scene=scene)
-    monkeypatch.setattr("netsp.plan.space.space_plan.Detours.shorten", lambda *_: None)
+    monkeypatch.setattr("netsp.plan.space.state_search.Detours.shorten", lambda *_: None)
     taut = plan(mission, scene=scene)
     assert taut.result.status.value == "optimal_of_states"
     assert found.length < taut.length - 0.1

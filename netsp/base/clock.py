@@ -12,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
@@ -86,12 +86,15 @@ class Clock:
         begun = begun or (time.monotonic(), time.process_time())
         self.start = begun[0]
         self.deadline = math.inf if limit is None else self.start + limit
+        self._pace: _Pace | None = None if within is None else within._pace
+        self._planned_end = self.deadline
         self._stop: StopThread | None = None
         if should_stop is not None:
             self._stop = StopThread(should_stop, self.policy.stop_interval_s)
         self._family: _Family = _Family(begun) if within is None else within._family
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
+            self._planned_end = min(self._planned_end, within._planned_end)
             self._stop = self._stop or within._stop
         self._flag: Flag | None = None
 
@@ -111,8 +114,46 @@ class Clock:
     stoppable = deprecated_method("stoppable", "can_stop")
 
     def part(self, share: float) -> Clock:
-        """Return a clock for a share of the time that is left."""
-        return Clock(None if self.limit is None else share * self.left, within=self)
+        """Return a clock for a share of the time that is left; of a paced clock, for a share of the
+        time that it plans with."""
+        left = self.planned_left
+        return Clock(None if left == math.inf else share * left, within=self)
+
+    def paced(self, planned_s: float) -> Clock:
+        """Return a clock that plans with some seconds from now on, however much time is left.
+
+        Shares of it do not depend on the time limit. So work that divides its time by shares does
+        the same up to the limit, whatever the limit is, and more time never leads to other results.
+
+        Parameters
+        ----------
+        planned_s : float
+            Seconds after which the clock is up, if its time does not end before.
+
+        Examples
+        --------
+        >>> run = Clock(10.0)
+        >>> round_ = run.paced(100.0)
+        >>> 49.0 < round_.part(0.5).planned_left <= 50.0, round_.part(0.5).left <= 10.0
+        (True, True)
+        """
+        paced = Clock(planned_s, within=self)
+        paced._pace, paced._planned_end = _Pace(), paced.start + planned_s
+        return paced
+
+    @property
+    def planned_left(self) -> float:
+        """Seconds that a paced clock plans with, and seconds left for others."""
+        if self._pace is None or self.is_stopped:
+            return self.left
+        return self._planned_end - time.monotonic()
+
+    @property
+    def has_run_out(self) -> bool:
+        """State of a paced clock of which some part was up when it was looked at: its work may have
+        been cut short."""
+        pace = self._pace
+        return pace is not None and (pace.has_run_out or any(f[0] != 0 for f in pace.flags))
 
     @property
     def limit(self) -> float | None:
@@ -163,7 +204,10 @@ class Clock:
     @property
     def is_up(self) -> bool:
         """State of having reached the limit."""
-        return self.left <= 0.0
+        is_up = self.left <= 0.0
+        if is_up and self._pace is not None:
+            self._pace.has_run_out = True
+        return is_up
 
     @property
     def flag(self) -> Flag:
@@ -176,6 +220,8 @@ class Clock:
                 DEADLINES.add(self.deadline, self._flag)
             if self._stop is not None:
                 self._stop.add(self._flag)
+            if self._pace is not None:
+                self._pace.flags.append(self._flag)
         return self._flag
 
     def check(self, doing: str) -> None:
@@ -323,6 +369,22 @@ def _is_compiling() -> bool:
     """Return whether Numba compiles a kernel just now."""
     lock = sys.modules.get("numba.core.compiler_lock")
     return lock is not None and bool(lock.global_compiler_lock.is_locked())
+
+
+@dataclass
+class _Pace:
+    """State that a paced clock shares with its parts.
+
+    Attributes
+    ----------
+    has_run_out
+        Whether one of them was up when it was looked at.
+    flags
+        Flags of these clocks.
+    """
+
+    has_run_out: bool = False
+    flags: list[Flag] = field(default_factory=list)
 
 
 class _Family:

@@ -127,8 +127,6 @@ def summary(
     elif tour.lower_bound is not None:
         bound = LowerBound(tour.lower_bound, Scope.STATES)
         verdict = f"{bound.says(tour.length, units)}: {legs}"
-        if bound.proves(tour.length):
-            verdict = f"the shortest along {legs} of the tether; there was no time for all legs"
     elif tour.solver == AS_GIVEN:
         verdict = "in the order given: no better order was found"
     elif tour.solver == GOING_ON:
@@ -165,7 +163,12 @@ def summary(
         )
     else:
         lines.append(f"flown    not: {'interrupted' if found.interrupted else 'the time was up'}")
-    if not tour.exact:
+    if tour.exact is None:
+        lines.append(
+            "words    none: the time was up before the words of the scene were found; netsp verify "
+            "finds them"
+        )
+    elif not tour.exact:
         lines.append(
             "words    the group of the cells is not completed: other words may be of the same "
             "class, too; an empty one still is that of a free tether"

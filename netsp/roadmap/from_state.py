@@ -153,6 +153,8 @@ class GraphFromState(TravelGraph):
                 if b is not None and b.gap(length) <= PATH_GAP_TOLERANCE
             ]
             status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
+        elif status is Status.FEASIBLE and low is not None and low.proves(length):
+            status = Status.optimal_of(low.scope)
         return dataclasses.replace(
             result,
             tour=tour,

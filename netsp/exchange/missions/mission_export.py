@@ -144,7 +144,7 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
             Waypoint(
                 visit.path[-1],
                 k,
-                visit.signature,
+                visit.signature or (),
                 visit.tether_length,
                 # from the x axis towards y, to clockwise from north
                 heading=None if heading is None else (north_heading + 90.0 - heading) % 360.0,
@@ -205,7 +205,8 @@ def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exa
 
     For the exact path, the words at the waypoints are checked as well.
     """
-    words, tether = context.words, context.present_tether
+    words, tether, tour = context.words, context.present_tether, context.mission.tour
+    assert tour is not None
     word, broken = words.try_word(np.vstack([tether.nodes, line, context.start_tether.nodes[::-1]]))
     if broken is not None or word != ():
         raise InputError("mission: its waypoints are not of the plan's homotopy class")
@@ -215,7 +216,8 @@ def _checked(context: PlanningContext, points: list[Waypoint], line: Floats, exa
                 continue
             path = np.vstack([tether.nodes, line[: k + 1], context.mission.places[p.goal]])
             word, broken = words.try_word(path)
-            if broken is not None or word != p.word:
+            stated = tour.stops[p.goal].signature
+            if broken is not None or stated not in (None, word):
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )

@@ -77,8 +77,9 @@ class SpaceSite(SpaceWorld):
         planned = []
         for k in at:
             (letters,) = self.letters.words_of_steps(ends[k][None], robot[None])
-            if letters is not None:
-                planned.append(self.letters.join(tuple(tour.stops[k].signature), letters))
+            signature = tour.stops[k].signature
+            if letters is not None and signature is not None:
+                planned.append(self.letters.join(tuple(signature), letters))
         return word in planned if planned else None
 
     def map_data(self) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.geometry import polylines
 from netsp.gtsp.travel.result import Result
+from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.planning_context import PlanningContext
@@ -36,7 +37,7 @@ class TourVisit:
     choice
         Number of its alternative, from 1 on; 0 for the position of the waypoint itself.
     word
-        Word of the tether there.
+        Word of the tether there; None if the words of the scene are not known.
     tether_length
         Length of the tether there, metres.
     path
@@ -47,7 +48,7 @@ class TourVisit:
 
     waypoint: int
     choice: int
-    word: tuple[int, ...]
+    word: tuple[int, ...] | None
     tether_length: float
     path: Floats
     longest_tether: float
@@ -72,6 +73,8 @@ class DrivenTour:
     fault
         Two states, -1 for the start, whose leg is to blame for a tether over its limit, or one that
         is not free at the end.
+    is_plane_optimum
+        Whether the tour is proven to be the shortest of the plane, among upright prisms.
     """
 
     tour: list[int]
@@ -80,6 +83,7 @@ class DrivenTour:
     length: float
     free: bool
     fault: tuple[int, int] | None
+    is_plane_optimum: bool = False
 
 
 @dataclass
@@ -99,6 +103,8 @@ class StateGraph:
     legs: dict[tuple[int, int], Floats] = field(default_factory=dict)
     # path from the start along the tether of each state; None if the robot has no room there
     _paths_out: list[Floats | None] = field(default_factory=list)
+    # states without a path, because the time was up
+    _skipped: list[int] = field(default_factory=list)
     # length of the shortest path from the start to each state, metres; inf if there is none
     _home_lengths: list[float] = field(default_factory=list)
     # state before on that path, for states without a path along their tether
@@ -123,11 +129,17 @@ class StateGraph:
             Whether there was time for the paths to all states.
         """
         is_complete = True
-        for v in range(len(self._paths_out), len(self.states.entries)):
+        known = len(self._paths_out)
+        self._paths_out += [None] * (len(self.states.entries) - known)
+        skipped, self._skipped = self._skipped, []
+        for v in (*skipped, *range(known, len(self.states.entries))):
             # each waypoint needs one path, even if the time is up
             is_complete = is_complete and not clock.is_up
             is_first = self.states.at_place[self.states.entries[v].place][0] == v
-            self._paths_out.append(self._path_along_tether(v) if is_complete or is_first else None)
+            if is_complete or is_first:
+                self._paths_out[v] = self._path_along_tether(v)
+            else:
+                self._skipped.append(v)
         if self.states.present is not None and self._paths_out[self.states.present] is None:
             # the robot is at this state, and may go back along its tether whatever the clearance
             self._paths_out[self.states.present] = np.vstack(
@@ -405,17 +417,13 @@ class StateGraph:
         return DrivenTour(list(tour), visits, path, total, free, fault or first_deviation)
 
 
-def with_status(result: Result, driven: DrivenTour, tolerance: float) -> Result:
+def with_status(result: Result, driven: DrivenTour) -> Result:
     """Return the result of a solver with the status that holds for the tour that was driven.
 
-    A driven path through the start may be longer than the solver's leg; then nothing is proven.
-
-    Parameters
-    ----------
-    tolerance : float
-        Tolerance for rounding, metres and share of the length.
+    A driven path through the start may be longer than the solver's leg; then its bound may not
+    prove the tour.
     """
-    solved = np.inf if result.length is None else result.length
-    if driven.length <= solved * (1.0 + tolerance) + tolerance:
-        return result
-    return replace(result, status=Status.FEASIBLE)
+    bound = result.lower_bound
+    if bound is None or not LowerBound(bound, Scope.STATES).proves(driven.length):
+        return replace(result, status=Status.FEASIBLE)
+    return replace(result, status=Status.OPTIMAL_OF_STATES)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,31 +46,37 @@ def drive_legs(context: PlanningContext, legs: Sequence[LegTo], home: Floats) ->
     Returns
     -------
     DrivenTour or None
-        The tour with its words and tethers; None if a leg has no room for the robot or no word,
-        the tether exceeds its limit, or it is not free at the end.
+        The tour with its tethers, and with its words if the context has words; None if a leg has no
+        room for the robot or no word, the tether exceeds its limit, or it is not free at the end.
     """
-    tether, word = context.present_tether, context.word_number(context.present_tether.nodes)
+    tether = context.present_tether
     limit = max(context.mission.tether_length, tether.length)
     visits: list[TourVisit] = []
     total = 0.0
     for leg in (*legs, LegTo(-1, 0, home)):
-        leg_word = context.word_number(leg.path)
-        if (
-            word is None
-            or leg_word is None
-            or not keeps_clearance(context.field, leg.path, context.mission)
-        ):
+        if not keeps_clearance(context.field, leg.path, context.mission):
             return None
-        word = context.words.multiply(word, leg_word)
         tether, longest = context.drive(tether, leg.path, is_fine=True)
         if longest > limit:
             return None
         total += polylines.length(leg.path)
         if leg.waypoint >= 0:
-            letters = context.words.letters(word)
             visits.append(
-                TourVisit(leg.waypoint, leg.choice, letters, tether.length, leg.path, longest)
+                TourVisit(leg.waypoint, leg.choice, None, tether.length, leg.path, longest)
             )
-    is_free = word == context.word_number(context.start_tether.nodes)
-    is_free = is_free and hang_alike(tether, context.start_tether, context.mission.delta)
-    return DrivenTour([], visits, np.asarray(home), total, True, None) if is_free else None
+    if not hang_alike(tether, context.start_tether, context.mission.delta):
+        return None
+    driven = DrivenTour([], visits, np.asarray(home), total, True, None)
+    return with_words(context, driven) if context.has_words else driven
+
+
+def with_words(context: PlanningContext, driven: DrivenTour) -> DrivenTour | None:
+    """Return a driven tour with the words of its tethers; None if a leg has no word, or the word at
+    the end is not that of the tether at the start."""
+    paths = [*(visit.path for visit in driven.visits), driven.home]
+    *words, at_home = context.words_along(paths)
+    is_free = at_home is not None and at_home == context.words.word(context.start_tether.nodes)
+    if not is_free or None in words:
+        return None
+    visits = [replace(v, word=word) for v, word in zip(driven.visits, words, strict=True)]
+    return replace(driven, visits=visits)

@@ -269,30 +269,37 @@ class _Judge:
 
     def _check_words(self) -> list[Check]:
         """Check the words at the visits, and that the word at the end is empty."""
-        mission, words = self.mission, self.context.words
-        walked, wrong = self.context.present_tether.nodes, []
-        for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
-            walked = np.vstack([walked, leg])
-            word, broken = words.try_word(np.vstack([walked, mission.places[k]]))
-            if broken is not None or word != stop.signature:
-                found = "no word" if broken is not None else f"the word {list(word)}"
-                wrong.append(f"visit {k} has {found}, stated {list(stop.signature)}")
-        word, broken = words.try_word(
-            np.vstack([walked, self.legs[-1], self.context.start_tether.nodes[::-1]])
-        )
-        if words.exact != self.tour.exact:
+        if not self.context.has_words:
+            unknown = "the words of the scene are not known"
+            names = ("words at the visits", "empty word at the end")
+            return [Check(name, True, unknown, was_made=False) for name in names]
+        context, words = self.context, self.context.words
+        wrong, n_unstated = [], 0
+        # the way to a waypoint ends at the waypoint itself, from where the next one begins
+        places = self.mission.places[: len(self.tour.stops), None]
+        legs = [np.vstack([leg, place]) for leg, place in zip(self.legs, places, strict=False)]
+        to_start = context.start_tether.nodes[::-1]
+        *found, at_end = context.words_along([*legs, np.vstack([self.legs[-1], to_start])])
+        for k, (stop, word) in enumerate(zip(self.tour.stops, found, strict=True)):
+            n_unstated += stop.signature is None
+            if word is None or stop.signature not in (None, word):
+                has = "no word" if word is None else f"the word {list(word)}"
+                listed = "none" if stop.signature is None else list(stop.signature)
+                wrong.append(f"visit {k} has {has}, stated {listed}")
+        if self.tour.exact not in (None, words.exact):
             wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
         caveat = "" if words.exact else "; other words may be of the same class, too"
+        stated = f"{n_unstated} not stated" if n_unstated else "all as stated"
         return [
-            Check("words at the visits", not wrong, _first_of(wrong) or f"all as stated{caveat}"),
+            Check("words at the visits", not wrong, _first_of(wrong) or f"{stated}{caveat}"),
             Check(
                 "empty word at the end",
-                broken is None and word == (),
+                at_end == (),
                 "contractible"
-                if broken is None and word == ()
+                if at_end == ()
                 else "no word"
-                if broken is not None
-                else f"{list(word)}",
+                if at_end is None
+                else f"{list(at_end)}",
             ),
         ]
 

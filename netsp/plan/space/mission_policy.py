@@ -558,15 +558,18 @@ class MissionPolicy:
 
     Attributes
     ----------
-    given_share
-        Share of the time for the flight in the order of the file, before the search. If it is too
-        short, that order is compared by its length and flown last.
+    round_s
+        Seconds that the first round of the search plans with; more than 0. Rounds do not depend on
+        the time limit, so that a longer limit never leads to a worse tour.
+    round_growth
+        Ratio of the times that two successive rounds plan with; more than 1. With a larger ratio,
+        less work is done again, and more of it is lost in the last round, which the limit ends.
     planning_share
-        Share of the remaining time for tours of the plane and along states and legs.
+        Share of a round for tours along states and legs.
     bound_share
-        Share of the remaining time for the bound on all tours.
+        Share of the remaining time of a round for the bound on all tours.
     going_on_share
-        Share of the remaining time for the order by going straight on.
+        Share of the remaining time of the first round for the order by going straight on.
     min_saving
         Share of the time until home that a flight by going straight on must save to replace a tour
         with a bound. Stopping within reach of the start saves less than the default.
@@ -575,6 +578,9 @@ class MissionPolicy:
         is shorter: the tour in the order of the file or, if that cannot be driven, another. A
         smaller number leaves more missions without any tour when the limit is short; with a larger
         one, very large missions end later.
+    given_order_s
+        CPU seconds, at least 0, up to which `predictive` drives the order of the file, even if the
+        time limit is shorter. That order is there along spokes before.
     tether_share
         Share of the tether that states and legs may need. The rest is for how the robot is steered,
         and for the tether's length between two steps along a leg.
@@ -591,12 +597,14 @@ class MissionPolicy:
         Policies of the parts of planning.
     """
 
-    given_share: float = 0.25
+    round_s: float = 8.0
+    round_growth: float = 4.0
     planning_share: float = 0.7
     bound_share: float = 0.3
     going_on_share: float = 0.3
     min_saving: float = 0.005
     first_tour_s: float = 15.0
+    given_order_s: float = 2.0
     tether_share: float = 0.99
     bound_worth: float = 1e-3
     max_cell_path_ratio: float = 1.35
@@ -617,3 +625,7 @@ class MissionPolicy:
         check_not_negative(self)
         _check_shares(self, "min_saving", "bound_worth")
         _check_minimum(self, max_cell_path_ratio=1.0)
+        if not self.round_s > 0.0:
+            raise InputError(f"round_s: expected more than 0, got {self.round_s:g}")
+        if not self.round_growth > 1.0:
+            raise InputError(f"round_growth: expected more than 1, got {self.round_growth:g}")

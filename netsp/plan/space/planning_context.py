@@ -4,9 +4,9 @@ policy."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -15,6 +15,7 @@ from netsp.base.arrays import Bools, Floats
 from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.geometry import polylines
 from netsp.base.time_flags import NEVER, Flag
+from netsp.hsignature.words import Word
 from netsp.plan.space.cells import FREE_CELL, OPEN_CELL
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import GapResolution
@@ -52,6 +53,28 @@ DIP_RATIO = 0.15
 an eighth of delta (docs/theory/tether.md)."""
 
 
+@dataclass
+class WordsOnDemand:
+    """Words of a scene, found when they are first needed.
+
+    Attributes
+    ----------
+    find
+        Finds the words.
+    found
+        The words; None until they are found.
+    """
+
+    find: Callable[[], SpaceSignature]
+    found: SpaceSignature | None = None
+
+    def get(self) -> SpaceSignature:
+        """Return the words, and find them if they are not known."""
+        if self.found is None:
+            self.found = self.find()
+        return self.found
+
+
 @dataclass(frozen=True)
 class PlanningContext:
     """Scene of a mission, with the words of its paths, the model of its tether and the policy.
@@ -62,8 +85,8 @@ class PlanningContext:
         Mission, and distance field of its scene.
     grid
         Box and cell size (`netsp.world.simulator.mission_run.mission_grid`).
-    words
-        Words of paths, in the water of the tether.
+    words_on_demand
+        Words of paths, in the water of the tether; they may not be known yet.
     model
         Model of the tether.
     bounds
@@ -78,7 +101,7 @@ class PlanningContext:
     mission: Mission
     field: DistanceField
     grid: Grid
-    words: SpaceSignature
+    words_on_demand: WordsOnDemand
     model: GeodesicTether
     bounds: tuple[float, ...] | None = None
     gaps: GapResolution | None = None
@@ -124,19 +147,57 @@ class PlanningContext:
         InputError
             As `netsp.plan.space.space_signature.SpaceSignature.in_box`.
         """
+        context = cls.without_words(mission, field, grid, bounds, policy)
+        context.words_on_demand.get()
+        return context
+
+    @classmethod
+    def without_words(
+        cls,
+        mission: Mission,
+        field: DistanceField,
+        grid: Grid,
+        bounds: tuple[float, ...] | None = None,
+        policy: MissionPolicy | None = None,
+    ) -> PlanningContext:
+        """Return the context of a mission whose words are found when they are first needed.
+
+        Parameters
+        ----------
+        bounds : tuple of float, optional
+            Bounds of the scene if they are known, metres.
+        """
         policy = policy or MissionPolicy()
-        high = grid.low + grid.cell * np.array(grid.free.shape)
-        words = SpaceSignature.in_box(
-            field,
-            grid.low,
-            high,
-            grid.cell,
-            mission.anchor,
-            tolerance=DIP_RATIO * mission.delta,
-            policy=policy.words,
+        words = WordsOnDemand(
+            partial(
+                SpaceSignature.in_box,
+                field,
+                grid.low,
+                grid.low + grid.cell * np.array(grid.free.shape),
+                grid.cell,
+                mission.anchor,
+                tolerance=DIP_RATIO * mission.delta,
+                policy=policy.words,
+            )
         )
         model = mission_tether(mission, field)
         return cls(mission, field, grid, words, model, bounds, policy=policy)
+
+    @property
+    def words(self) -> SpaceSignature:
+        """Return the words of paths, and find them if they are not known.
+
+        Raises
+        ------
+        InputError
+            As `netsp.plan.space.space_signature.SpaceSignature.in_box`.
+        """
+        return self.words_on_demand.get()
+
+    @property
+    def has_words(self) -> bool:
+        """Return whether the words of paths are known."""
+        return self.words_on_demand.found is not None
 
     @property
     def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
@@ -327,6 +388,29 @@ class PlanningContext:
     def word_number(self, path: Floats) -> int | None:
         """Return the number of the word of a path (k, 3) in the table; None if it has no word."""
         return self.words.word_number(path)[0]
+
+    def words_along(self, paths: Iterable[Floats]) -> list[Word | None]:
+        """Return the word of the tether at the end of each path, if the robot follows the paths one
+        after the other from where the mission begins.
+
+        Parameters
+        ----------
+        paths : iterable of ndarray, shape (k, 3)
+            Paths, metres; each begins near the end of the one before.
+
+        Returns
+        -------
+        list of Word or None
+            None from the first path on that has no word.
+        """
+        line = self.present_tether.nodes
+        number, words = self.word_number(line), list[Word | None]()
+        for path in paths:
+            line = np.vstack([line[-1:], path])
+            leg = None if number is None else self.word_number(line)
+            number = None if leg is None or number is None else self.words.multiply(number, leg)
+            words.append(None if number is None else self.words.letters(number))
+        return words
 
 
 def keeps_clearance(field: DistanceField, path: Floats, mission: Mission) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -236,7 +236,7 @@ def drive_plane_tours(
                 if shortest is None or driven.length < shortest.length:
                     shortest = driven
         if shortest is not None:
-            yield shortest
+            yield replace(shortest, is_plane_optimum=is_optimal)
             longest = max(visit.longest_tether for visit in shortest.visits)
             if is_optimal and longest <= usable * context.mission.tether_length:
                 return

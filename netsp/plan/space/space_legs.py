@@ -6,6 +6,7 @@ import heapq
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,8 @@ class RobotPaths:
     effort: StateEffort
     tethers: dict[int, list[Floats]] = field(default_factory=dict)
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
+    # pairs of places whose paths were searched for in all classes
+    _searched: set[tuple[int, int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         distances = self.places.distances
@@ -71,7 +74,8 @@ class RobotPaths:
         tether_clock : Clock, optional
             When it is up, no more paths are made of tethers.
         """
-        targets = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in self._known]
+        done = self._searched if search else self._known
+        targets = [int(m) for m in self.neighbours[n] if m > n and (n, int(m)) not in done]
         if not targets:
             return
         context, words = self.context, self.context.words
@@ -96,6 +100,8 @@ class RobotPaths:
                 bent = find_bent_paths(context, known, self._max_length(n, m))
                 paths += self._numbered(bent)
                 paths.sort(key=_length_of)
+            if search:
+                self._searched.add((n, m))
             self._known[n, m] = paths
             self._known[m, n] = self._numbered([path[::-1] for _, path in paths])
 
@@ -149,6 +155,11 @@ class RobotPaths:
         for word, path in sorted(found.items(), key=_length_of):
             if len(paths) < self.effort.paths and all(word != w for w, _ in paths):
                 paths.append((word, path))
+
+    @property
+    def count(self) -> int:
+        """Return the number of pairs of places whose paths were searched for in all classes."""
+        return len(self._searched)
 
     def find_all(self, clock: Clock, on_progress: Callable[[str], None]) -> None:
         """Find all paths between neighbours.
@@ -217,6 +228,21 @@ class DrivenLegs:
                 yield v, w, min(path, reverse[::-1], key=polylines.length), True
 
 
+class _QueuedLeg(NamedTuple):
+    """Path that the tether of a state is to be driven along, the shortest first.
+
+    It has a length, metres, a number that no other has, the state, the place at its end, and the
+    word and nodes (k, 3) of the path.
+    """
+
+    length: float
+    number: int
+    state: int
+    target: int
+    word: int
+    path: Floats
+
+
 @dataclass
 class StateGrowth:
     """Legs and the states that they lead to.
@@ -229,11 +255,17 @@ class StateGrowth:
     states: States
     paths: RobotPaths
     legs: DrivenLegs = field(default_factory=DrivenLegs)
-    _queue: list[tuple[float, int, int, int, int]] = field(default_factory=list)
-    _postponed: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _queue: list[_QueuedLeg] = field(default_factory=list)
+    _postponed: list[_QueuedLeg] = field(default_factory=list)
     _known: int = 0
     _count: int = 0
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
+    # states, places and paths that are queued or driven already
+    _queued: set[tuple[int, int, int, float]] = field(default_factory=set)
+
+    def queue_new_paths(self) -> None:
+        """Queue the paths that were found since the states at their ends were queued."""
+        self._queue_from(0)
 
     def grow(self, max_per_place: int, clock: Clock, on_progress: Callable[[str], None]) -> bool:
         """Drive legs until all are driven, or the time is up; return whether all are.
@@ -259,14 +291,24 @@ class StateGrowth:
 
     def _queue_new_states(self) -> None:
         """Queue the paths from new states."""
-        for v in range(self._known, len(self.states.entries)):
+        self._queue_from(self._known)
+
+    def _queue_from(self, first: int) -> None:
+        """Queue the paths from a state and all later ones that are not queued yet."""
+        for v in range(first, len(self.states.entries)):
             state = self.states.entries[v]
             key = state.place, state.word
             self._shortest[key] = min(state.tether.length, self._shortest.get(key, np.inf))
             for m in self.paths.neighbours[state.place]:
-                for k, (_, path) in enumerate(self.paths.between(state.place, int(m))):
+                for word, path in self.paths.between(state.place, int(m)):
+                    length = polylines.length(path)
+                    if (v, int(m), word, length) in self._queued:
+                        continue
+                    self._queued.add((v, int(m), word, length))
                     self._count += 1
-                    heapq.heappush(self._queue, (polylines.length(path), self._count, v, int(m), k))
+                    heapq.heappush(
+                        self._queue, _QueuedLeg(length, self._count, v, int(m), word, path)
+                    )
         self._known = len(self.states.entries)
 
     def _drive_next(self) -> bool:
@@ -275,10 +317,9 @@ class StateGrowth:
         if not self._queue:
             return False
         leg = heapq.heappop(self._queue)
-        _, _, v, target, k = leg
+        _, _, v, target, word, path = leg
         states, legs = self.states, self.legs
         state = states.entries[v]
-        word, path = self.paths.between(state.place, target)[k]
         new_word = states.context.words.multiply(state.word, word)
         if not states.can_hold(target, new_word):
             self._postponed.append(leg)

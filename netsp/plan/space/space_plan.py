@@ -15,8 +15,8 @@ only if a bound on all tours (`netsp.plan.space.path_bound`) proves it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -24,37 +24,32 @@ import numpy as np
 from netsp.base.arrays import Floats
 from netsp.base.clock import Clock, TimeLimit
 from netsp.base.deprecated import deprecated_method
-from netsp.base.errors import InputError, LimitReachedError, counted
+from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.travel.result import Result, relative_gap
-from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import SolverLike, solve_graph
 from netsp.plan.solver_table import SOLVERS
-from netsp.plan.space.board import DrivenTour, StateGraph, TourVisit, with_status
+from netsp.plan.space.board import DrivenTour, TourVisit
 from netsp.plan.space.given_order import drive_given_order
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.mission_policy import MissionPolicy, StageTimePolicy
-from netsp.plan.space.non_taut_moves import Detours
+from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import find_gaps_on, resolve_gaps
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.prisms import drive_plane_tours
 from netsp.plan.space.short_orders import short_order_tour
-from netsp.plan.space.space_legs import RobotPaths, StateGrowth
-from netsp.plan.space.states import States, add_states_with_room, find_first_states
-from netsp.plan.space.trees import add_states_of_trees
+from netsp.plan.space.space_legs import RobotPaths
+from netsp.plan.space.spoke_tours import Spokes, drive_spoke_orders
+from netsp.plan.space.state_search import SearchRun, StateSearch
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size, check_tether
-from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, thinned_path
+from netsp.world.mission.planned_tour import PlannedTour, PlannedVisit, status_of_tour, thinned_path
 from netsp.world.paths.tree import Grid
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 from netsp.world.simulator.mission_run import mission_grid
-
-LENGTH_ROUNDING = 1e-9
-"""Tolerance for the rounding of lengths, relative."""
 
 TAUT_LEGS = "taut"
 """Kind of a plan along states and their taut legs."""
@@ -150,14 +145,6 @@ class SpacePlan:
             1.0 + (self.context.policy.bound_worth if has_bound else 0.0)
         )
 
-    def _status(self, bound: float | None) -> Status:
-        """Return the status of the tour: `optimal` if a bound on all tours to all waypoints proves
-        it, else that of the tour along states and legs."""
-        if bound is None or self.unreached:
-            return self.result.status
-        proven = LowerBound(bound, Scope.ALL_TOURS).proves(self.length)
-        return Status.OPTIMAL if proven else self.result.status
-
     def to_mission(
         self, solver: str = "auto", seed: int = 0, bound: float | None = None
     ) -> Mission:
@@ -189,7 +176,9 @@ class SpacePlan:
                 for visit in self.visits
             ),
             home=thinned_path(self.home),
-            status=self._status(bound),
+            status=status_of_tour(
+                self.length, result.lower_bound, bound, is_complete=not self.unreached
+            ),
             solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind,
             seed=seed,
             length=self.length,
@@ -199,7 +188,7 @@ class SpacePlan:
             gap_to_all=relative_gap(self.length, bound),
             states=self.states,
             legs=self.legs,
-            exact=self.context.words.exact,
+            exact=self.context.words.exact if self.context.has_words else None,
             unresolved_gaps=self.context.unresolved_gaps,
         )
         given_waypoints = self.mission.waypoints
@@ -349,10 +338,48 @@ def candidate_plans(
             on_progress=on_progress,
             policy=policy,
         )
-    places = Places.for_mission(context.mission, context.field)
     options = {"solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit}
-    run = _Run(context, places, clock, on_progress or _silent, options)
-    yield from _candidates(run, scene, whole_tether)
+    stages = StagedSearch(context, scene, on_progress or _silent, options, whole_tether)
+    yield from stages.in_plane(clock)
+    yield from stages.in_short_order(clock)
+    yield from stages.along_states(clock)
+
+
+def prepare_without_words(
+    mission: Mission,
+    clock: Clock,
+    *,
+    scene: Scene,
+    field: DistanceField | None = None,
+    policy: MissionPolicy | None = None,
+) -> PlanningContext:
+    """Return the context for planning a mission on its default grid, whose words are not known yet.
+
+    Parameters
+    ----------
+    clock : Clock
+        Clock of the run.
+    scene : Scene
+        Scene of the mission.
+    field : DistanceField, optional
+        Distance field of the scene; computed if needed.
+    policy : MissionPolicy, optional
+        Effort, time and limits.
+
+    Raises
+    ------
+    InputError
+        Waypoints in solids, a mission too large, or bounds that do not hold it.
+    LimitReachedError
+        The time was up before; says which work was broken off.
+    """
+    check_size(mission)
+    check_bounds(mission, scene)
+    field = field or clock.bounded("measuring distances in the scene", scene.field)
+    mission = mission.checked_waypoints(field)
+    Places.for_mission(mission, field)  # refuse bad waypoints
+    grid = clock.bounded("measuring the cells", partial(mission_grid, mission, scene, field))
+    return PlanningContext.without_words(mission, field, grid, scene.bounds, policy)
 
 
 def prepare_context(
@@ -478,218 +505,174 @@ def _silent(_: str) -> None:
     """Ignore a line of progress."""
 
 
-@dataclass(frozen=True)
-class _Run:
-    """Run of a search for candidate plans.
+@dataclass
+class StagedSearch:
+    """Candidate tours of a mission, in the stages in which `solve_mission` asks for them.
 
     Attributes
     ----------
-    context, places
-        Context of the mission, and its places.
-    clock
-        Clock of the run.
+    context
+        Context of the mission.
+    scene
+        Scene of the mission; None if it is not known.
     on_progress
         Called with a line of text at each stage.
     options
         Options of `netsp.plan.solve_problem.solve_graph`.
+    whole_tether
+        Whether tours of the plane may need the whole tether, for a caller that flies them.
+    is_in_plane
+        Whether a tour of the plane was found.
+    plane_optimum
+        Length of the shortest tour of the plane, if it is proven, metres.
     """
 
     context: PlanningContext
-    places: Places
-    clock: Clock
+    scene: Scene | None
     on_progress: Callable[[str], None]
     options: dict[str, Any]
+    whole_tether: bool = True
+    is_in_plane: bool = False
+    plane_optimum: float | None = None
+    _search: StateSearch | None = field(default=None, init=False)
 
-    @property
-    def mission(self) -> Mission:
-        """Return the mission."""
-        return self.context.mission
+    @cached_property
+    def places(self) -> Places:
+        """Return the places of the mission."""
+        return Places.for_mission(self.context.mission, self.context.field)
 
-    @property
-    def times(self) -> StageTimePolicy:
-        """Return the division of the time."""
-        return self.context.policy.times
+    @cached_property
+    def spokes(self) -> Spokes:
+        """Return the spokes of the places."""
+        return Spokes(self.context, self.places)
 
     @property
     def seed(self) -> int:
         """Return the random seed."""
         return int(self.options["seed"])
 
+    def spokes_as_given(self) -> SpacePlan | None:
+        """Return the tour in the order of the file along spokes; None if there is none."""
+        order = np.flatnonzero((self.places.choice == 0) & self.places.is_waypoint)
+        driven = self.spokes.drive(order.tolist())
+        return None if driven is None else self._to_plan(driven, AS_GIVEN)
 
-def _plans_without_states(
-    run: _Run, scene: Scene | None, whole_tether: bool
-) -> Iterator[SpacePlan]:
-    """Yield the tours of the plane, or if there are none, the tour in a short order."""
-    context, places = run.context, run.places
-    in_plane = False
-    if scene is not None:
-        policy = context.policy.plane
-        part = run.clock.part(policy.time_share)
+    def in_plane(self, clock: Clock) -> Iterator[SpacePlan]:
+        """Yield the tours of the plane, among upright prisms."""
+        if self.scene is None:
+            return
+        policy = self.context.policy.plane
         for driven in drive_plane_tours(
-            context, scene, places, part, run.seed, policy, whole_tether
+            self.context,
+            self.scene,
+            self.places,
+            clock.part(policy.time_share),
+            self.seed,
+            policy,
+            self.whole_tether,
         ):
-            in_plane = True
-            yield _to_plan(context, places, driven, PLANE)
-    if not in_plane:
-        run.on_progress("short orders")
-        short = short_order_tour(context, places, run.clock, run.seed)
-        if short is not None and short.visits:
-            yield _to_plan(context, places, short, SHORT_ORDER)
+            self.is_in_plane = True
+            self.plane_optimum = driven.length if driven.is_plane_optimum else None
+            yield self._to_plan(driven, PLANE)
 
+    def along_spokes(self, clock: Clock) -> Iterator[SpacePlan]:
+        """Yield tours in short orders along spokes."""
+        self.on_progress("short orders along spokes")
+        policy = self.context.policy.orders
+        for driven in drive_spoke_orders(self.spokes, clock, self.seed, policy):
+            yield self._to_plan(driven, SHORT_ORDER)
 
-def _find_states(run: _Run) -> States:
-    """Return the first states, or raise InputError if no tether reaches any waypoint."""
-    context, mission, share = run.context, run.mission, run.context.policy.tether_share
-    # a robot that is farther out than the share may still come back
-    present = context.present_tether.length * (1.0 + LENGTH_ROUNDING)
-    limit = max(share * mission.tether_length, present)
-    run.on_progress("shortest tethers to each waypoint")
-    effort = context.policy.states.effort(len(run.places))
-    part = run.clock.part(run.times.first_states_share)
-    states = find_first_states(context, run.places, limit, effort, part)
-    if states.reached - {len(mission.waypoints)}:
-        return states
-    nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
-    if nearest <= limit:
-        raise InputError(
-            f"waypoints: no path through the water brings any of them within {limit:.4g} m of "
-            f"tether, though the nearest is {nearest:.4g} m from the anchor as the crow flies: "
-            f"walls, or gaps narrower than a cell ({context.words.cells.cell:.3g} m)"
+    def without_words(self, clock: Clock) -> Iterator[SpacePlan]:
+        """Yield tours that need no words: short orders along spokes, and the tours of the plane.
+
+        Parameters
+        ----------
+        clock : Clock
+            Clock of the run, of which both plan with a time that does not depend on its limit.
+        """
+        policy = self.context.policy
+        yield from self.along_spokes(clock.paced(policy.round_s))
+        yield from self.in_plane(
+            clock.paced(2.0 * policy.plane.max_s / max(policy.plane.time_share, 1e-9))
         )
-    raise InputError(
-        f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
-        f"({100 * share:g} % of tether_length), and the nearest is {nearest:.4g} "
-        "m from the anchor as the crow flies"
+
+    def in_short_order(self, clock: Clock) -> Iterator[SpacePlan]:
+        """Yield the tour in a short order that `predictive` drives, unless there is a tour of the
+        plane."""
+        if self.is_in_plane:
+            return
+        self.on_progress("short orders")
+        short = short_order_tour(self.context, self.places, clock, self.seed)
+        if short is not None and short.visits:
+            yield self._to_plan(short, SHORT_ORDER)
+
+    def along_states(self, clock: Clock) -> Iterator[SpacePlan]:
+        """Yield the tour with detours, if it is shorter, the tour along taut legs, and the tour out
+        and back."""
+        check_tether(self.context.mission, self.context.present_tether.length)
+        run = SearchRun(self.context, self.places, clock, self.on_progress, self.options)
+        if self._search is None:
+            self._search = StateSearch(run)
+        else:
+            self._search.resume(run)
+        yield from _candidates(self._search)
+
+    def with_words(self, clock: Clock, is_first: bool) -> Iterator[SpacePlan]:
+        """Yield the tours of a round: in the first round the short order, too."""
+        if is_first:
+            yield from self.in_short_order(clock)
+        yield from self.along_states(clock)
+
+    def _to_plan(self, driven: DrivenTour, kind: str) -> SpacePlan:
+        """Return a driven tour as a plan."""
+        return _to_plan(self.context, self.places, driven, kind)
+
+
+def _plan_of_search(
+    search: StateSearch, result: Result | None, driven: DrivenTour, kind: str
+) -> SpacePlan:
+    """Return a tour of a search as a plan; without a result, nothing is known of other tours."""
+    run = search.run
+    visited = {visit.waypoint for visit in driven.visits}
+    return SpacePlan(
+        run.mission,
+        tuple(driven.visits),
+        driven.home,
+        driven.length,
+        result or Result(None, driven.length, None, Status.FEASIBLE),
+        len(search.states.entries),
+        len(search.board.legs),
+        tuple(n for n in range(len(run.mission.waypoints)) if n not in visited),
+        driven.free,
+        run.context,
+        search.paths,
+        kind,
     )
 
 
-class _StateSearch:
-    """Search for tours along states and legs.
-
-    Parameters
-    ----------
-    run : _Run
-        The run.
-    states : States
-        First states; more are added.
-    """
-
-    def __init__(self, run: _Run, states: States) -> None:
-        self.run, self.states = run, states
-        self.effort = run.context.policy.states.effort(len(run.places))
-        tethers = {
-            n: [states.entries[s].tether.nodes for s in numbers]
-            for n, numbers in states.at_place.items()
-        }
-        self.paths = RobotPaths(run.context, run.places, self.effort, tethers)
-        self.board = StateGraph(run.context, states)
-        self.growth = StateGrowth(states, self.paths)
-
-    def connect(self) -> None:
-        """Find the robot's paths, and legs between the first states and those along trees."""
-        run, times, board = self.run, self.run.times, self.board
-        clock, on_progress = run.clock, run.on_progress
-        self.paths.find_all(clock, on_progress)
-        on_progress("trees of legs")
-        add_states_of_trees(self.states, self.paths, clock.part(times.tree_share))
-        board.update(self.growth.legs, clock.part(times.home_path_share))
-        if missing := set(range(len(run.mission.waypoints))) - board.reached_waypoints:
-            on_progress("paths with room for the robot")
-            part = clock.part(times.first_states_share)
-            add_states_with_room(self.states, missing, self.effort.words, part)
-            board.update(self.growth.legs, clock.part(times.home_path_share))
-        self.growth.grow(0, clock.part(times.tree_share), on_progress)
-
-    def best_along_taut_legs(self) -> tuple[tuple[Result, DrivenTour] | None, bool]:
-        """Grow states and legs in stages, and return the best tour along them, and whether all legs
-        were driven in some stage."""
-        run, times, board = self.run, self.run.times, self.board
-        on_progress, options = run.on_progress, run.options
-        clock = run.clock.part(times.taut_share)
-        best: tuple[Result, DrivenTour] | None = None
-        is_complete = False
-        for max_per_place in self.effort.states:
-            begin = clock.elapsed
-            share_suffices = board.legs or times.growth_share * clock.left >= times.min_growth_s
-            growing = (
-                clock.part(times.growth_share) if share_suffices else Clock(times.min_growth_s)
-            )
-            has_grown = self.growth.grow(max_per_place, growing, on_progress)
-            on_progress("paths by way of the anchor")
-            has_homes = board.update(self.growth.legs, clock.part(times.home_path_share))
-            is_complete = (has_homes and has_grown) or is_complete
-            is_last = max_per_place == self.effort.states[-1]
-            share = times.solve_share if is_last else times.early_solve_share
-            best = _better(best, _best_driven(board, clock, on_progress, best, share, options))
-            if clock.left < clock.elapsed - begin:
-                if not is_last and not (best is not None and best[0].status is Status.OPTIMAL):
-                    share = times.solve_share
-                    found = _best_driven(board, clock, on_progress, best, share, options)
-                    best = _better(best, found)
-                break
-        return best, is_complete
-
-    def shorter(self, best: DrivenTour | None, is_proven: bool) -> DrivenTour | None:
-        """Return a shorter tour with detours, if there is one.
-
-        If words distinguish all states, detours lead to the tethers that straight legs lead to.
-        """
-        if is_proven and not self.states.has_free_ends:
-            return None
-        run = self.run
-        return Detours(self.board, self.paths).shorten(best, run.clock, run.on_progress, run.seed)
-
-    def to_plan(self, result: Result | None, driven: DrivenTour, kind: str) -> SpacePlan:
-        """Return a tour as a plan; without a result, nothing is known of other tours."""
-        n_waypoints = len(self.run.mission.waypoints)
-        visited = {visit.waypoint for visit in driven.visits}
-        return SpacePlan(
-            self.run.mission,
-            tuple(driven.visits),
-            driven.home,
-            driven.length,
-            result or Result(None, driven.length, None, Status.FEASIBLE),
-            len(self.states.entries),
-            len(self.board.legs),
-            tuple(n for n in range(n_waypoints) if n not in visited),
-            driven.free,
-            self.run.context,
-            self.paths,
-            kind,
-        )
-
-
-def _candidates(run: _Run, scene: Scene | None, whole_tether: bool) -> Iterator[SpacePlan]:
-    """Yield the candidates of `candidate_plans`."""
-    mission = run.mission
-    check_tether(mission, run.context.present_tether.length)
-    yield from _plans_without_states(run, scene, whole_tether)
-    search = _StateSearch(run, _find_states(run))
+def _candidates(search: StateSearch) -> Iterator[SpacePlan]:
+    """Yield the candidates along states and legs."""
+    run, mission = search.run, search.run.mission
     search.connect()
     best, is_complete = search.best_along_taut_legs()
     if not search.board.reached_waypoints:
         raise InputError(
             f"waypoints: the robot reaches none of them with its clearance of {mission.clearance:g}"
         )
-    is_proven = best is not None and best[0].status is Status.OPTIMAL and is_complete
+    is_proven = best is not None and best[0].status is Status.OPTIMAL_OF_STATES and is_complete
     shorter = search.shorter(best and best[1], is_proven)
     along_taut = None
     if best is not None:
-        result, driven = best
-        if result.status is Status.OPTIMAL:
-            # optimal over the graph only; an incomplete graph lacks legs within reach
-            of_states = Status.OPTIMAL_OF_STATES if is_complete else Status.FEASIBLE
-            result = replace(result, status=of_states)
-        along_taut = search.to_plan(result, driven, TAUT_LEGS)
+        along_taut = _plan_of_search(search, *best, TAUT_LEGS)
     if shorter is not None:
         # the solver's bound does not hold for the detours, which are not in its graph
-        yield search.to_plan(None, shorter, DETOURS)
+        yield _plan_of_search(search, None, shorter, DETOURS)
     if along_taut is not None:
         yield along_taut
     run.on_progress("out along the tether and back")
     fallback = search.board.drive_out_and_back()
     if fallback is not None:
-        yield search.to_plan(None, fallback, OUT_AND_BACK)
+        yield _plan_of_search(search, None, fallback, OUT_AND_BACK)
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
@@ -707,52 +690,3 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
         seed=seed,
         iteration_limit=1,
     )
-
-
-def _better(
-    best: tuple[Result, DrivenTour] | None, found: tuple[Result, DrivenTour] | None
-) -> tuple[Result, DrivenTour] | None:
-    """Return the shorter of two tours; of equals the second, because more was known when it was
-    found."""
-    if best is None or (found is not None and found[1].length <= best[1].length):
-        return found
-    return best
-
-
-def _best_driven(
-    board: StateGraph,
-    clock: Clock,
-    on_progress: Callable[[str], None],
-    best: tuple[Result, DrivenTour] | None,
-    share: float,
-    options: dict[str, Any],
-) -> tuple[Result, DrivenTour] | None:
-    """Return the best tour that was driven without fault.
-
-    As long as there is time, the graph is solved again without the legs at fault; then those legs
-    are replaced by paths through the start.
-    """
-    times = board.context.policy.times
-    n_solves, found = 0, None
-    warm_start = None if best is None else best[1].tour
-    while n_solves < times.max_solves or clock.is_up:
-        if found is None:
-            faults = f", {counted(n_solves, 'leg')} at fault forbidden" if n_solves else ""
-            on_progress(f"order{faults}")
-            solving = Clock(times.min_solve_s) if clock.is_up else clock.part(share)
-            found = board.solve(solving, warm_start, **options)
-            if found is None:
-                return None
-        result, tour = found
-        on_progress("driving the tour")
-        driven = board.drive(tour)
-        if driven.fault is None:
-            return with_status(result, driven, LENGTH_ROUNDING), driven
-        is_joined = board.forbid(driven.fault)
-        if clock.is_up and not (is_joined and board.can_reach_all(tour)):
-            return None  # no time is left, and this tour can no longer be driven
-        warm_start = None  # it may contain the forbidden leg
-        n_solves += 1
-        if not clock.is_up:
-            found = None
-    return None

@@ -152,6 +152,13 @@ def find_first_states(
         The tether of the mission's state has no word; says where.
     """
     states = States(context, places, limit, effort.states[0])
+    add_first_states(states, effort, clock)
+    return states
+
+
+def add_first_states(states: States, effort: StateEffort, clock: Clock) -> None:
+    """Add the states that `find_first_states` returns, as far as they are not known."""
+    context, places, limit = states.context, states.places, states.limit
     words = context.words
     if places.present is not None:
         number, last_point = words.word_number(context.present_tether.nodes)
@@ -160,7 +167,8 @@ def find_first_states(
                 f"state.tether: no word at {shown(last_point)}: a gap narrower than the cell of "
                 f"{words.cells.cell:g} m; expected a smaller cell"
             )
-        states.add(places.present, number, context.present_tether)
+        if not states.at_place.get(places.present):
+            states.add(places.present, number, context.present_tether)
     anchor = np.asarray(context.mission.anchor, dtype=float)[None]
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     flag = clock.flag
@@ -169,7 +177,6 @@ def find_first_states(
     )
     for n in range(len(places)):
         _add_states(states, n, found, anchor, 1 if clock.is_up else effort.words)
-    return states
 
 
 def add_states_with_room(states: States, missing: set[int], words: int, clock: Clock) -> None:

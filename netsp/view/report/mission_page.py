@@ -188,7 +188,8 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
             "–" if stop is None else f"{stop.tether_length:.4g}",
             "–" if stop is None else f"{stop.longest_tether:.4g}",
         ]
-        word = None if stop is None else list(stop.signature)
+        stated = None if stop is None else stop.signature
+        word = None if stated is None else list(stated)
         if summary:
             row.append(f"{flown[k]['tether']:.4g}" if k in flown else reasons.get(k, "–"))
             same = words.get(k, {}).get("as_planned")

@@ -11,7 +11,7 @@ from netsp.base.arrays import Floats
 from netsp.base.field_types import Name, NonNegative, Point3
 from netsp.base.geometry import polylines
 from netsp.base.validated import Model
-from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
+from netsp.model.bound_scope import OPTIMALITY_TOLERANCE, LowerBound, Scope
 from netsp.model.solution import Status
 
 PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
@@ -23,7 +23,13 @@ class PlannedVisit(Model):
     path: Annotated[
         PathField, Field(description="path from the previous stop to the waypoint, (x, y, z), m")
     ]
-    signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
+    signature: Annotated[
+        tuple[int, ...] | None,
+        Field(
+            description="word of the tether there; missing if there was no time to find the words "
+            "of the scene"
+        ),
+    ] = None
     tether_length: Annotated[NonNegative, Field(description="length of the taut tether there, m")]
     longest_tether: Annotated[
         NonNegative, Field(description="greatest length of the taut tether on the path there, m")
@@ -48,6 +54,38 @@ class UnresolvedGap(Model):
 def _within(gap: Any) -> bool:
     """Return whether a gap from a file proves that a tour is the shortest."""
     return isinstance(gap, int | float) and gap <= OPTIMALITY_TOLERANCE
+
+
+def status_of_tour(
+    length: float, of_states: float | None, of_all: float | None, *, is_complete: bool = True
+) -> Status:
+    """Return the status that bounds prove for a tour.
+
+    Parameters
+    ----------
+    length : float
+        Length of the tour, metres.
+    of_states : float or None
+        Lower bound on tours along the states and legs found, metres.
+    of_all : float or None
+        Lower bound on all tours to the same waypoints, metres.
+    is_complete : bool
+        Whether the tour visits all waypoints; if not, no bound proves it optimal.
+
+    Examples
+    --------
+    >>> status_of_tour(10.0, 10.0, 9.0).value
+    'optimal_of_states'
+    >>> status_of_tour(10.0, None, 10.0 - 1e-6).value
+    'optimal'
+    >>> status_of_tour(10.0, 9.9, 9.0).value
+    'feasible'
+    """
+    if is_complete and of_all is not None and LowerBound(of_all, Scope.ALL_TOURS).proves(length):
+        return Status.OPTIMAL
+    if of_states is not None and LowerBound(of_states, Scope.STATES).proves(length):
+        return Status.OPTIMAL_OF_STATES
+    return Status.FEASIBLE
 
 
 class PlannedTour(Model):
@@ -102,9 +140,12 @@ class PlannedTour(Model):
         Field(description="number of legs between these states that were driven"),
     ] = 0
     exact: Annotated[
-        bool,
-        Field(description="whether words that differ are of different classes among the cells"),
-    ] = True
+        bool | None,
+        Field(
+            description="whether words that differ are of different classes among the cells; "
+            "missing if there was no time to find words"
+        ),
+    ] = None
     unresolved_gaps: Annotated[
         tuple[UnresolvedGap, ...] | None,
         Field(
@@ -138,6 +179,11 @@ class PlannedTour(Model):
     def longest_tether(self) -> float:
         """Length of the longest tether before the path home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
+
+    def without_words(self) -> PlannedTour:
+        """Return a copy without words and gaps, which refer to the cells of a grid."""
+        stops = tuple(stop.model_copy(update={"signature": None}) for stop in self.stops)
+        return self.model_copy(update={"stops": stops, "exact": None, "unresolved_gaps": None})
 
     def without_bounds(self) -> PlannedTour:
         """Return a copy with the status feasible and no bounds."""
