@@ -21,7 +21,7 @@ def beside_plan(limit):
     """Planner on its path from (-1, 1.5, 0) to (2, 2, 0), its tether model, and its first path."""
     mission = Mission(
         scene="-", anchor=ANCHOR, start=START, waypoints=[(2.0, 2.0, 0.0)],
-        tether_length=limit, clearance=0.2, delta=0.1,
+        tether_length=limit, clearance=0.2, delta=0.1, speed=0.6,
     )  # fmt: skip
     field = POST.field()
     tethers, grid = GeodesicTether(field, mission.delta), mission_grid(mission, POST, field)

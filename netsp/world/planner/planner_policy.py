@@ -58,6 +58,9 @@ class PredictivePolicy:
         moves in that time is kept in reserve as tether.
     rest_check_s
         Time between two checks that the tether still fits on the rest of a path, s.
+    rest_warning_s
+        Shortest time in which the limit can be reached, at cruise speed, for which such a check is
+        left out, s.
     unmapped_reserve
         Tether kept in reserve while a range sensor may find solids, metres.
     snag_tolerance
@@ -87,6 +90,7 @@ class PredictivePolicy:
     anchor_check_s: float = 2.0
     anchor_lag_s: float = 3.0
     rest_check_s: float = 0.5
+    rest_warning_s: float = 2.0
     unmapped_reserve: float = 0.2
     snag_tolerance: float = 0.1
     home_check_steps: int = 20

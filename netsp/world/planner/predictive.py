@@ -226,14 +226,16 @@ class PredictivePlanner(Planner):
         """Return whether the tether no longer fits on the rest of the path.
 
         A tether may hang on an edge that it slips off in the plan, for example because the vehicle
-        is beside its path. The check runs at intervals, and only where the limit is in reach: a
-        tether grows by at most the length of the rest.
+        is beside its path. The check runs at intervals, and only near the limit: a tether grows by
+        at most the distance that the robot moves.
         """
-        if self.is_anchor_moving or self.now < self._rest_checked + self.predictive.rest_check_s:
+        policy = self.predictive
+        if self.is_anchor_moving or self.now < self._rest_checked + policy.rest_check_s:
             return False
         self._rest_checked = self.now
         rest, limit = np.vstack([robot, self.path]), self.limit
-        if not self.has_load and tether.length + polylines.length(rest) <= limit:
+        growth = min(polylines.length(rest), self.mission.speed * policy.rest_warning_s)
+        if self.payout(tether) + growth <= limit:
             return False
         return not self._fits(tether, rest, limit)
 
