@@ -11,8 +11,7 @@ COMB = Path(__file__).parent / "data" / "comb-tight.json"
 
 
 @pytest.mark.parametrize(
-    ("speed", "current"),
-    [(1.0, (0.0, 0.0, 0.0)), (0.8, (0.2, 0.2, 0.1)), (0.5, (0.0, 0.0, 0.3))],
+    ("speed", "current"), [(1.0, (0.0, 0.0, 0.0)), (0.8, (0.2, 0.2, 0.1)), (0.5, (0.0, 0.0, 0.3))]
 )
 def test_all_are_visited_between_plates_at_any_speed_in_any_current(speed, current):
     """Over plates and down behind them, with 23.9 m of tether; the fourth waypoint was given up."""

@@ -34,7 +34,7 @@ from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
 from netsp.roadmap.explain_unreachable import shortest_tethers
 from netsp.roadmap.from_state import from_state
-from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.travel_graph import TravelGraph
 from netsp.world.mission.mission import Mission
@@ -228,7 +228,7 @@ def drive_plane_tours(
             try:
                 part = Clock(policy.max_s, within=clock.part(0.5))
                 found = plane.shortest_legs(share, touches, part, seed)
-            except (InputError, InfeasibleError, LimitReachedError):
+            except (InputError, InfeasibleError, LimitReachedError, UnknownPathError):
                 continue
             driven = None if found is None else drive_legs(context, found.legs, found.home)
             if found is not None and driven is not None:
@@ -348,16 +348,21 @@ class _PlaneTour:
         """
         context, points = self.context, self.places.points[goals]
         laid = float(polylines.length(context.start_tether.nodes))
-        problem = self._problem(points, share, touches=False)
-        problem = problem.model_copy(
-            update={"base": context.mission.start, "tether_length": problem.tether_length - laid}
+        tether_problem, robot_problem = (
+            problem.model_copy(
+                update={
+                    "base": context.mission.start,
+                    "tether_length": problem.tether_length - laid,
+                }
+            )
+            for problem in (self._problem(points, share, t) for t in (True, False))
         )
-        if not problem.tether_length > 0.0:
+        if not tether_problem.tether_length > 0.0:
             return None
-        solution = solve(problem, time_limit=clock, seed=seed)
+        solution = solve(tether_problem, time_limit=clock, seed=seed)
         if not solution.tour:
             return None
-        paths = TautPaths(problem)
+        paths = TautPaths(robot_problem)
         ends = [(0, ()), *((visit.goal + 1, visit.signature) for visit in solution.tour), (0, ())]
         legs = [
             paths.path(a, b, concatenate(invert(before), after))
