@@ -243,7 +243,7 @@ def flown(target: Path) -> None:
         "cover", "site.json", "--anchor=-3,-3,-1", "--inspect", "mesh", "--patch", "0.5",
         "--camera", "3", "--share", "0.9", "-o", "survey.json", folder=folder,
     )  # fmt: skip
-    run_netsp("solve", "survey.json", "--time-limit", "15", "-o", "planned.json", folder=folder)
+    run_netsp("solve", "survey.json", "--time-limit", "20", "-o", "planned.json", folder=folder)
     run_netsp("execute", "planned.json", "-o", "flown", folder=folder)
     shutil.copy(folder / "flown" / "run.png", target)
 

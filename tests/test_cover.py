@@ -34,11 +34,12 @@ RING = Scene(name="ring", solids=[{"torus": {
 }}], bounds=[-5, -4, -9, 5, 4, 0])  # fmt: skip
 CAMERA = Camera(range=2.5, patch=0.25)
 ANCHOR = (-3.0, -3.0, -0.5)
+FEWEST = {"anchor": ANCHOR, "camera": CAMERA, "standoff": 1.2, "objective": "viewpoints"}
 
 
 @pytest.fixture(scope="module")
 def covered():
-    return cover(RING, anchor=ANCHOR, camera=CAMERA, standoff=1.2, time_limit=None)
+    return cover(RING, **FEWEST, time_limit=None)
 
 
 def test_what_is_planned_is_what_a_camera_sees_there(covered):
@@ -61,7 +62,7 @@ def test_waypoints_keep_off_within_bounds_and_within_the_tether(covered):
     assert field.distance(mission.places).min() >= mission.clearance - 1e-3
     assert (mission.places >= [-5, -4, -9]).all()
     assert (mission.places <= [5, 4, 0]).all()
-    short = cover(RING, anchor=ANCHOR, camera=CAMERA, standoff=1.2, tether_length=5.0)
+    short = cover(RING, **FEWEST, tether_length=5.0)
     assert np.linalg.norm(short.mission.places - ANCHOR, axis=1).max() <= 5.0
     assert short.visible < covered.visible
 
@@ -74,12 +75,12 @@ def test_flown_it_is_seen(covered):
 
 
 def test_the_same_seed_gives_the_same_waypoints(covered):
-    again = cover(RING, anchor=ANCHOR, camera=CAMERA, standoff=1.2, time_limit=None)
+    again = cover(RING, **FEWEST, time_limit=None)
     assert again.mission == covered.mission
 
 
 def test_less_of_the_surface_needs_fewer_waypoints(covered):
-    half = cover(RING, anchor=ANCHOR, camera=CAMERA, standoff=1.2, share=0.5)
+    half = cover(RING, **FEWEST, share=0.5)
     assert len(half.viewpoints) < len(covered.viewpoints)
     assert half.seen >= 0.5 * half.visible
 
@@ -94,8 +95,9 @@ def test_a_wall_hides_what_is_behind_it():
     ball = {"name": "ball", "sphere": {"center": [0.6, 0, 0], "radius": 0.5}}
     scene = Scene(name="niche", solids=[*walls, ball], bounds=[-6, -4, -4, 4, 4, 4])
     found = cover(
-        scene, anchor=(-5, 0, 0), camera=CAMERA, standoff=1.0, clearance=0.45, inspect=("ball",)
-    )
+        scene, anchor=(-5, 0, 0), camera=CAMERA, standoff=1.0, clearance=0.45, inspect=("ball",),
+        objective="viewpoints",
+    )  # fmt: skip
     assert 0.2 < found.visible < 0.9
     assert (found.mission.places[:, 0] < 0.6).all()
 
@@ -174,17 +176,27 @@ def test_a_mission_is_written_that_can_be_solved(tmp_path, capsys):
     scene.write_text(RING.model_dump_json(exclude_none=True))
     plot = tmp_path / "cover.png"
     call = ["cover", str(scene), "--anchor=-3,-3,-0.5", "--camera", "2.5,70", "--standoff", "1.2"]
-    assert main([*call, "-o", str(out), "--plot", str(plot), "--share", "0.5"]) == 0
+    call += ["--patch", "0.4"]
+    assert main([*call, "-o", str(out), "--plot", str(plot), "--share", "0.3"]) == 0
     said = capsys.readouterr()
     assert said.out == ""
-    for word in ("seen ", "waypoints ", "tether ", "netsp solve"):
+    for word in ("seen ", "waypoints ", "tour ", "tether ", "netsp solve"):
         assert word in said.err
     assert plot.read_bytes().startswith(b"\x89PNG")
     mission = Mission.load(out)
     assert mission.load_scene().name == "ring"
     assert all(w.heading is not None for w in mission.waypoints)
-    assert main([*call, "--share", "0.5", "--quiet"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["waypoints"]) == len(mission.waypoints)
+    assert "shortest time" in said.err
+    few = tmp_path / "few.json"
+    again = ["--fewest", "--speed", "0.4", "--share", "0.3", "-o", str(few), "--json"]
+    assert main([*call, *again]) == 0
+    said = capsys.readouterr()
+    assert "the fewest" in said.err
+    told = json.loads(said.out)
+    assert told["objective"] == "viewpoints"
+    assert told["waypoints"] <= len(mission.waypoints)
+    assert Mission.load(few).speed == 0.4
+    assert told["tour_s"] > told["tour_length"] / 0.4
 
 
 BAD = {
@@ -229,5 +241,9 @@ def test_what_is_not_a_scene_is_told(tmp_path, capsys):
 def test_arguments_are_checked():
     with pytest.raises(InputError, match="farthest: expected more than 0"):
         cover(RING, anchor=ANCHOR, farthest=0.0)
+    with pytest.raises(InputError, match="objective: expected 'time' or 'viewpoints', got 'few'"):
+        cover(RING, anchor=ANCHOR, objective="few")
+    with pytest.raises(InputError, match="speed: expected more than 0"):
+        cover(RING, anchor=ANCHOR, speed=0.0)
     with pytest.raises(InputError, match="tether_length"):
         cover(RING, anchor=ANCHOR, tether_length=-1.0)

@@ -215,6 +215,11 @@ COVER = Command(
         "cover only this solid (or mesh, cloud, floor); may be repeated",
         repeats=True,
     ),
+    Option(
+        "--fewest",
+        "choose the fewest waypoints; default: waypoints and tour with the shortest time",
+    ),
+    Option("--speed V", "speed of the robot (m/s); default that of missions, 0.3", length),
     time_limit("seconds for the whole command", 60.0),
     SEED,
     Data("-o, --output FILE", "write the mission to this file (default: stdout)"),

@@ -46,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
             incidence=args.incidence,
             farthest=args.farthest,
             inspect=tuple(args.inspect) if args.inspect else None,
+            objective="viewpoints" if args.fewest else "time",
+            speed=args.speed,
             time_limit=clock,
             seed=args.seed,
             on_progress=stages,
@@ -66,6 +68,9 @@ def run(args: argparse.Namespace) -> int:
                 "seen": result.seen,
                 "visible": result.visible,
                 "candidates": result.candidates,
+                "objective": result.objective,
+                "tour_length": result.tour_length,
+                "tour_s": result.tour_s,
                 "tether_length": result.mission.tether_length,
                 "units": scene.units,
             }
@@ -97,13 +102,18 @@ def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> 
     """Return the result in a few lines."""
     mission, count = found.mission, len(found.viewpoints)
     percent_less = 100.0 * (1.0 - found.bound / count)
-    fewest = f"no choice among them has fewer than {found.bound}, {percent_less:.1f} % less"
+    chosen = f"the fewest: no choice among them has fewer than {found.bound}, {percent_less:.1f} % "
+    chosen += "less"
     if count == found.bound:
-        fewest = "no choice among them has fewer"
+        chosen = "the fewest: no choice among them has fewer"
+    if found.objective == "time":
+        chosen = "chosen with their tour for the shortest time"
     lines = [
         f"seen      {100 * found.seen:.1f} % of the surface; from all {found.candidates} "
         f"candidates together {100 * found.visible:.1f} %",
-        f"waypoints {count}; {fewest}",
+        f"waypoints {count}; {chosen}",
+        f"tour      about {found.tour_length:.1f} {units}, {found.tour_s:.0f} s at "
+        f"{mission.speed:g} {units}/s, before the tether is planned",
         f"tether    {mission.tether_length:g} {units}",
     ]
     if output:

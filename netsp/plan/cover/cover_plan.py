@@ -14,10 +14,16 @@ from netsp.base.errors import InputError
 from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.base.interrupt_signals import until_interrupt
-from netsp.plan.cover.choose import Choice, choose
 from netsp.plan.cover.cover_policy import CoverPolicy
+from netsp.plan.cover.tour_choice import TIME, VIEWPOINTS, Objective, TourChoice, TourChooser
 from netsp.plan.cover.viewpoint_swaps import find_alternatives
-from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarsen, find_viewpoints
+from netsp.plan.cover.viewpoints import (
+    Viewer,
+    Viewpoints,
+    coarsen,
+    find_more_viewpoints,
+    find_viewpoints,
+)
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
 from netsp.world.mission.mission_limits import check_bounds
@@ -54,6 +60,13 @@ class Cover(ComparesArrays):
         Share of it that is seen from any of the candidates.
     visible_patches : ndarray of bool, shape (m,)
         Whether each patch is seen from any of the candidates.
+    objective : {"time", "viewpoints"}
+        What was made small: the time until the robot is home, or the number of viewpoints.
+    tour_length : float
+        Estimated length of the tour in the order of the waypoints, metres. The planner may find a
+        shorter tour, or need a longer one for the tether.
+    tour_s : float
+        Estimated time of that tour with its visits, s.
     """
 
     mission: Mission
@@ -64,6 +77,9 @@ class Cover(ComparesArrays):
     seen: float
     visible: float
     visible_patches: Bools
+    objective: Objective
+    tour_length: float
+    tour_s: float
 
     def __repr__(self) -> str:
         """Return the numbers on one line."""
@@ -87,6 +103,8 @@ def cover(
     incidence: float = 75.0,
     farthest: float | None = None,
     inspect: tuple[str, ...] | None = None,
+    objective: Objective = TIME,
+    speed: float | None = None,
     time_limit: TimeLimit = 60.0,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
@@ -119,6 +137,11 @@ def cover(
         Largest distance of a patch that is seen, metres; the camera's range by default.
     inspect : tuple of str, optional
         Names of the solids to be seen; all but half spaces and the sea floor by default.
+    objective : {"time", "viewpoints"}
+        What to make small: the time until the robot is home, with viewpoints and tour chosen
+        together, or the number of viewpoints.
+    speed : float, optional
+        Speed of the robot, m/s; by default that of missions.
     time_limit : float or Clock, optional
         Seconds; when they are up, the best result by then is returned.
     seed : int
@@ -131,8 +154,8 @@ def cover(
     Returns
     -------
     Cover
-        Waypoints, as a mission for `netsp.plan.space.mission_solver.solve_mission`. Their order has
-        no meaning.
+        Waypoints in the order of a short tour, as a mission for
+        `netsp.plan.space.mission_solver.solve_mission`, which may change the order.
 
     Raises
     ------
@@ -144,7 +167,9 @@ def cover(
     with until_interrupt(time_limit) as clock:
         standoff = 0.5 * camera.range if standoff is None else standoff
         farthest = camera.range if farthest is None else min(farthest, camera.range)
-        _check(standoff, farthest, clearance, share, incidence, tether_length)
+        _check(standoff, farthest, clearance, share, incidence, tether_length, speed)
+        if objective not in (TIME, VIEWPOINTS):
+            raise InputError(f"objective: expected {TIME!r} or {VIEWPOINTS!r}, got {objective!r}")
         mission = Mission(
             scene="-",
             name=scene.name,
@@ -156,6 +181,8 @@ def cover(
             inspect=inspect,
             tether_length=tether_length or UNKNOWN_TETHER_LENGTH,
         )
+        if speed is not None:
+            mission = mission.model_copy(update={"speed": speed})
         check_bounds(mission, scene)
         field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
@@ -189,9 +216,12 @@ def cover(
                 "inspect: no part of the surface can be seen from where the robot can go; "
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
-        report(f"choosing among {len(found)} viewpoints")
-        choice = choose(found.sees, patches.areas, share, clock, policy)
-        return _build_cover(mission, patches, found, choice, reach, share)
+        if objective == TIME:
+            more_clock = clock.part(policy.more_time_share)
+            found = find_more_viewpoints(viewer, found, more_clock, report)
+        chooser = TourChooser(viewer, start_place, mission.speed, share, clock, seed, report, fine)
+        choice = chooser.choose(found, objective)
+        return _build_cover(mission, patches, found, choice, reach, share, objective)
 
 
 def _check(
@@ -201,10 +231,11 @@ def _check(
     share: float,
     incidence: float,
     tether_length: float | None,
+    speed: float | None,
 ) -> None:
     positive = {"standoff": standoff, "farthest": farthest, "share": share, "incidence": incidence}
-    if tether_length is not None:
-        positive["tether_length"] = tether_length
+    optional = {"tether_length": tether_length, "speed": speed}
+    positive |= {name: value for name, value in optional.items() if value is not None}
     for name, value in positive.items():
         checked_argument(name, value, 0.0)
         if not value > 0.0:
@@ -297,18 +328,19 @@ def _build_cover(
     mission: Mission,
     patches: Patches,
     found: Viewpoints,
-    choice: Choice,
+    choice: TourChoice,
     reach: _Reach,
     share: float,
+    objective: Objective,
 ) -> Cover:
-    chosen, policy = found.subset(choice.chosen), reach.policy
+    chosen, policy = found.subset(choice.order), reach.policy
     length = mission.tether_length
     if length == UNKNOWN_TETHER_LENGTH:
         longest = float(reach.tethers(chosen.places).max())
         length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
-    alternatives_of = find_alternatives(found, choice.chosen, patches.areas, needed, policy)
-    viewpoints = [_viewpoint(found, k) for k in choice.chosen]
+    alternatives_of = find_alternatives(found, choice.order, patches.areas, needed, policy)
+    viewpoints = [_viewpoint(found, k) for k in choice.order]
     waypoints = tuple(
         MissionWaypoint(
             position=v.position,
@@ -328,6 +360,9 @@ def _build_cover(
         float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
         float(areas[visible].sum() / areas.sum()),
         visible,
+        objective,
+        choice.length,
+        choice.seconds,
     )
 
 

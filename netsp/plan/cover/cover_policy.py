@@ -2,10 +2,75 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from netsp.base.errors import InputError
-from netsp.base.number_ranges import check_positive
+from netsp.base.number_ranges import check_positive, check_shares
+
+
+@dataclass(frozen=True)
+class TourSearchPolicy:
+    """Policy of the search for a covering tour. All numbers are positive; shares are at most 1.
+
+    Attributes
+    ----------
+    max_rounds
+        Maximum number of rounds.
+    idle_rounds_per_visit
+        Number of rounds without a gain after which the search ends, as a multiple of the visits of
+        the tour and one more.
+    min_gain
+        Smallest gain, as a share of the cost, that counts as one.
+    max_removed
+        Maximum number of viewpoints that a round removes.
+    run_share, random_share
+        Shares of rounds that remove a run of the tour, and any viewpoints. The others remove the
+        viewpoints nearest to one of them.
+    min_gain_exponent, max_gain_exponent
+        Range of the exponent of the area that a viewpoint adds, which is weighed against its price.
+    noise
+        Largest logarithm of the random factor of each viewpoint in a round.
+    removed_bias
+        Factor of viewpoints just removed, in every other round, so that others take their place.
+    min_price
+        Price that is added to those of all insertions, metres, so that none is free.
+    max_segment
+        Maximum number of visits that a move puts elsewhere in the tour.
+    min_move_gain
+        Smallest saving of a move that is made, as a share of the tour; smaller ones are rounding.
+    rounding
+        Share of the needed area that may be missing because of rounding.
+    max_detour
+        Cost above that of the current tour up to which a round goes on, in mean costs of a visit.
+    rounds_per_report
+        Number of rounds between two lines about the progress.
+    warmth
+        Increase of the cost that is accepted with a probability of 1/e in the first round, in mean
+        costs of a visit. It falls to 0 in the last round.
+    """
+
+    max_rounds: int = 5_000
+    idle_rounds_per_visit: int = 50
+    min_gain: float = 1e-4
+    max_removed: int = 12
+    run_share: float = 0.4
+    random_share: float = 0.1
+    min_gain_exponent: float = 0.7
+    max_gain_exponent: float = 1.3
+    noise: float = 0.22
+    removed_bias: float = 0.6
+    min_price: float = 0.02
+    max_segment: int = 3
+    min_move_gain: float = 1e-9
+    rounding: float = 1e-12
+    max_detour: float = 1.5
+    rounds_per_report: int = 500
+    warmth: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+        check_shares(self, "run_share", "random_share", "removed_bias")
 
 
 @dataclass(frozen=True)
@@ -37,6 +102,37 @@ class CoverPolicy:
         Maximum number of alternatives of a viewpoint.
     max_places
         Maximum number of viewpoints with their alternatives, all of which the tour chooses among.
+    standoff_ratios
+        Distances from the surface of the viewpoints that a tour of least time chooses among, as
+        multiples of the stand-off. None is farther than the camera sees.
+    heading_offsets_deg
+        Angles between their headings and the straight look at a patch, degrees.
+    max_candidates
+        Maximum number of viewpoints that such a tour chooses among.
+    max_sight_lines
+        Maximum number of straight legs between viewpoints that are checked for solids.
+    samples_per_clearance
+        Points on such a leg per clearance, at which its distance from solids is tested.
+    sparse_neighbours
+        Number of neighbours of a viewpoint in the graph of detours round solids.
+    turning_ratios
+        Distances from the surface of the points where such detours may turn, as multiples of the
+        clearance. A line between points at 2 clears a square edge.
+    blocked_ratio
+        Length of a leg round a solid, as a multiple of the straight one, if that graph has no path.
+    free_turn_deg
+        Turn at a viewpoint straight above or below the surface, where the heading on arrival is not
+        known, degrees.
+    visit_steps
+        Time of a visit without a turn, in steps of the flight: the rest of the step in which the
+        robot arrives, half a step on average, and the step in which it looks.
+    more_time_share
+        Share of the remaining time for the search for more viewpoints for such a tour.
+    max_recounts
+        Number of searches for such a tour, each with more area than the one before as long as less
+        than the share is seen of the fine patches that a flight counts.
+    tours
+        Policy of the search for a covering tour.
     """
 
     search_time_share: float = 0.6
@@ -50,9 +146,28 @@ class CoverPolicy:
     max_matrix_entries: int = 4_000_000
     max_alternatives: int = 2
     max_places: int = 150
+    standoff_ratios: tuple[float, ...] = (0.7, 1.0, 1.4, 1.8)
+    heading_offsets_deg: tuple[float, ...] = (0.0,)
+    max_candidates: int = 3000
+    max_sight_lines: int = 150_000
+    samples_per_clearance: float = 2.0
+    sparse_neighbours: int = 16
+    turning_ratios: tuple[float, ...] = (1.05, 2.0)
+    blocked_ratio: float = 1.5
+    free_turn_deg: float = 60.0
+    visit_steps: float = 1.5
+    max_recounts: int = 4
+    more_time_share: float = 0.3
+    tours: TourSearchPolicy = TourSearchPolicy()
 
     def __post_init__(self) -> None:
         check_positive(self)
-        for name in ("search_time_share", "max_tether_share"):
+        for name in ("search_time_share", "max_tether_share", "more_time_share"):
             if getattr(self, name) > 1.0:
                 raise InputError(f"{name}: expected a share up to 1, got {getattr(self, name)!r}")
+        for name in ("standoff_ratios", "heading_offsets_deg", "turning_ratios"):
+            values = getattr(self, name)
+            if not values or not all(math.isfinite(v) for v in values):
+                raise InputError(f"{name}: expected one number or more, got {values!r}")
+            if name != "heading_offsets_deg" and min(values) <= 0.0:
+                raise InputError(f"{name}: expected numbers above 0, got {values!r}")

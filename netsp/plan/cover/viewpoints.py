@@ -20,7 +20,7 @@ from netsp.base.clock import Clock
 from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
-from netsp.world.simulator.coverage import Coverage, Patches
+from netsp.world.simulator.coverage import Coverage, Patches, nearest_point
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,27 @@ class Viewer:
         toward = self.patches.centres[targets] - places
         headings = np.arctan2(toward[:, 1], toward[:, 0])
         level = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
-        headings = np.where(level, headings, 0.0)
+        return self.views(places, np.where(level, headings, 0.0))
+
+    def arrival_headings(self, places: Floats) -> tuple[Floats, Bools]:
+        """Return the headings (n,) of a robot that arrives at places (n, 3), radians.
+
+        It turns to the nearest patch on the way, as `netsp.world.simulator.coverage` describes.
+
+        Returns
+        -------
+        headings : ndarray, shape (n,)
+            Headings; 0 where they are not known.
+        is_known : ndarray of bool, shape (n,)
+            False where the patch is straight above or below, so that the robot keeps its heading.
+        """
+        near = np.array([nearest_point(self.patches.centres, p) for p in places], dtype=np.int64)
+        toward = self.patches.centres[near] - places
+        is_known = np.hypot(toward[:, 0], toward[:, 1]) >= 0.2 * np.linalg.norm(toward, axis=1)
+        return np.where(is_known, np.arctan2(toward[:, 1], toward[:, 0]), 0.0), is_known
+
+    def views(self, places: Floats, headings: Floats) -> Viewpoints:
+        """Return the viewpoints at places (n, 3) with headings (n,), and what each sees."""
         sees = [self.seen_from(p, float(h)) for p, h in zip(places, headings, strict=True)]
         return Viewpoints(
             places,
@@ -182,6 +202,47 @@ def find_viewpoints(
     )
 
 
+def find_more_viewpoints(
+    viewer: Viewer, found: Viewpoints, clock: Clock, on_progress: Callable[[str], None]
+) -> Viewpoints:
+    """Return viewpoints with others between them, so that a tour can choose among many.
+
+    Patches that are spread evenly are looked at from several distances and at several angles, and
+    from the same places with the heading of a robot that arrives, which takes no turn. When the
+    clock is up, the viewpoints found by then are returned.
+
+    Parameters
+    ----------
+    found : Viewpoints
+        Viewpoints before the whole structure.
+    """
+    policy, patches = viewer.policy, viewer.patches
+    ratios, offsets = policy.standoff_ratios, np.radians(policy.heading_offsets_deg)
+    max_targets = (policy.max_candidates - len(found)) // (len(ratios) * (1 + len(offsets)))
+    if max_targets < 1:
+        return found
+    targets = spread_out(patches.centres, 0.0, max_targets)
+    on_progress(f"looking at {len(targets)} patches from several distances")
+    views = [found]
+    for ratio in sorted(ratios, key=lambda ratio: abs(math.log(ratio))):
+        if clock.is_up:
+            break
+        far = np.full(len(targets), min(ratio * viewer.standoff, viewer.farthest))
+        places, before = viewer.places_before(targets, np.zeros((len(targets), 3)), far)
+        arrival, is_level = viewer.arrival_headings(places)
+        toward = patches.centres[before] - places
+        is_aside = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
+        straight = np.where(is_aside, np.arctan2(toward[:, 1], toward[:, 0]), arrival)
+        views += [viewer.views(places, straight + offset) for offset in offsets]
+        is_other = is_level & (np.abs(straight - arrival) > math.radians(1.0))
+        views.append(viewer.views(places[is_other], arrival[is_other]))
+    return Viewpoints(
+        np.vstack([v.places for v in views]),
+        np.concatenate([v.headings for v in views]),
+        np.vstack([v.sees for v in views]),
+    )
+
+
 def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
     """Return other angles and distances from which to look at each patch, straight first."""
     tries = viewer.policy.views_per_hidden_patch
@@ -228,14 +289,24 @@ def coarsen(patches: Patches, size: float) -> Patches:
     return Patches(patches.centres[first], normals[first], areas, sides)
 
 
-def spread_out(points: Floats, apart: float) -> Ints:
+def spread_out(points: Floats, apart: float, max_count: int | None = None) -> Ints:
     """Return the numbers of points so far apart that balls of radius `apart` about them hold all
-    others. Each is the one farthest from those before (Gonzalez 1985)."""
+    others. Each is the one farthest from those before (Gonzalez 1985).
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Points, metres.
+    apart : float
+        Radius of the balls, metres.
+    max_count : int, optional
+        Maximum number of points; with fewer than needed, the balls do not hold all others.
+    """
     chosen = [0]
     distances = np.linalg.norm(points - points[0], axis=1)
     while True:
         k = int(distances.argmax())
-        if distances[k] <= apart:
+        if distances[k] <= apart or len(chosen) == max_count:
             return np.array(chosen)
         chosen.append(k)
         distances = np.minimum(distances, np.linalg.norm(points - points[k], axis=1))
