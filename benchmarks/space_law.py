@@ -43,6 +43,7 @@ from netsp.plan.space.mission_policy import StatePolicy
 from netsp.plan.space.path_bound import LegBounds, _bound_without_tether, bound_all_tours
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.prisms import drive_plane_tours
 from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.space_plan import candidate_plans, prepare_context
 from netsp.world.mission.mission import Mission
@@ -61,6 +62,8 @@ class Effort:
     legs_s, bound_s, plan_s, drive_s
         Seconds for the bound that ignores the tether, for the bound on all tours, for the tours of
         netsp (0 for none), and for other tours with the tether model.
+    plane_s
+        Seconds for the tours of the plane among upright solids.
     points
         Number of random points of each kind in the visibility graph.
     variants
@@ -71,6 +74,7 @@ class Effort:
     bound_s: float = 1.5
     plan_s: float = 1.5
     drive_s: float = 1.0
+    plane_s: float = 3.0
     points: int = 150
     variants: int = 3
 
@@ -294,6 +298,13 @@ def _tours(
             yield "driven", driven.length
             if driven.length <= shortest * (1.0 + 1e-9):
                 break  # no tour along these paths is shorter
+    in_plane = drive_plane_tours(
+        context, setting.scene, known.places, Clock(effort.plane_s), whole_tether=True
+    )
+    for driven in in_plane:
+        if judged(driven, context, setting.scene) is not None:
+            yield "netsp, plane", driven.length
+            break
     if effort.plan_s <= 0.0:
         return
     try:
