@@ -190,7 +190,9 @@ def cover(
         report("surface of the scene")
         fine = clock.bounded(
             "covering the surface with patches",
-            lambda: surface_patches(scene, field, camera.patch, np.array([anchor]), inspect),
+            lambda: surface_patches(
+                scene, field, camera.patch, np.array([anchor]), inspect, clearance=clearance
+            ),
         )
         patches = coarsen(fine, camera.patch)
         mission = mission.model_copy(update={"start": tuple(start_place.tolist())})

@@ -21,6 +21,7 @@ from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
 from netsp.world.simulator.coverage import Coverage, Patches, nearest_point
+from netsp.world.simulator.mesh_patches import merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,26 +268,12 @@ def coarsen(patches: Patches, size: float) -> Patches:
     size : float
         Edge of the cubes, metres.
     """
-    count = len(patches.areas)
-    normals = patches.normals
-    axis = np.abs(normals).argmax(axis=1)
-    facing = 2 * axis + (normals[np.arange(count), axis] > 0.0)
-    cells = np.floor(patches.centres / size).astype(np.int64)
-    _, which = np.unique(np.column_stack([cells, facing]), axis=0, return_inverse=True)
-    which = which.ravel()
-    group_sizes = np.bincount(which)
-    middles = (
-        np.column_stack([np.bincount(which, c) for c in patches.centres.T]) / group_sizes[:, None]
-    )
-    distances = np.linalg.norm(patches.centres - middles[which], axis=1)
-    order = np.lexsort((distances, which))
-    first = order[np.r_[True, np.diff(which[order]) > 0]]
-    areas: Floats = np.bincount(which, patches.areas).astype(float)
+    first, which, areas = merged(patches.centres, patches.normals, patches.areas, size)
     sides = patches.sides
     if len(sides):
         sides = np.unique(which[sides], axis=0)
         sides = sides[sides[:, 0] != sides[:, 1]]
-    return Patches(patches.centres[first], normals[first], areas, sides)
+    return Patches(patches.centres[first], patches.normals[first], areas, sides)
 
 
 def spread_out(points: Floats, apart: float, max_count: int | None = None) -> Ints:

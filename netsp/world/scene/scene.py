@@ -22,8 +22,9 @@ from netsp.base.validated import Model
 from netsp.model.problem import Circle, Problem
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.grid import VoxelGrid
+from netsp.world.scene.mesh_body import MeshBody, Surface, body_of_mesh
 from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file
-from netsp.world.scene.scene_policy import FloorPolicy, ScenePolicy
+from netsp.world.scene.scene_policy import FloorPolicy, GridPolicy, MeshPolicy, ScenePolicy
 from netsp.world.scene.seams import seam_boxes
 from netsp.world.scene.shapes import (
     Box,
@@ -38,6 +39,8 @@ from netsp.world.scene.shapes import (
 )
 from netsp.world.scene.solids import BOX
 from netsp.world.scene.tally import Tally
+
+Triangles = tuple[Floats, npt.NDArray[np.int64]]
 
 _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
 
@@ -105,6 +108,25 @@ class Source(Model):
         return Placement(self.scale, self.up, self.origin, self.rotate)
 
 
+class MeshSource(Source):
+    """Mesh in a file that a scene file names."""
+
+    surface: Annotated[
+        Surface | None,
+        Field(
+            description="what open parts are: `solid`, whose holes are closed, or `sheet`, with "
+            "water on both sides; null for a choice by their winding numbers"
+        ),
+    ] = None
+    thickness: Annotated[
+        Positive | None,
+        Field(
+            description="thickness of sheets and of parts thinner than a voxel, m; null for four "
+            "voxels"
+        ),
+    ] = None
+
+
 class Floor(Model):
     """Sea floor from a bathymetry grid in a file that a scene file names."""
 
@@ -140,7 +162,7 @@ class Scene(FileModel):
     ----------
     solids : tuple of Solid
         Exact shapes.
-    mesh : Source or None
+    mesh : MeshSource or None
         File with a mesh.
     cloud : Source or None
         File with a cloud of points.
@@ -169,9 +191,7 @@ class Scene(FileModel):
     name: Annotated[Name, Field(description="name of the scene")] = "scene"
     units: Annotated[Name, Field(description="name of the unit of length")] = "m"
     solids: Annotated[tuple[Solid, ...], Field(description="solids in the water")] = ()
-    mesh: Annotated[Source | None, Field(description="a closed triangle mesh; null for none")] = (
-        None
-    )
+    mesh: Annotated[MeshSource | None, Field(description="a triangle mesh; null for none")] = None
     cloud: Annotated[Source | None, Field(description="points on surfaces; null for none")] = None
     floor: Annotated[Floor | None, Field(description="the sea floor; null for none")] = None
     problem: Annotated[
@@ -343,22 +363,50 @@ class Scene(FileModel):
         policy = policy or ScenePolicy()
         parts, points, notes = self._files(policy.floor)
         options: dict[str, Any] = {
-            "voxel": voxel or self._voxel(),
+            "voxel": voxel or self._voxel(policy.grid),
             "memory_limit": memory_limit,
             "on_progress": on_progress,
             "source": self._source(),
             "policy": policy.grid,
         }
+        if not parts:
+            assert points is not None
+            grid = voxels.grid_of_cloud(points, **options)
+            return replace(grid, notes=(*notes, *grid.notes))
+        bodies = self._bodies(parts, policy.mesh)
+        if self.mesh is not None:
+            notes += _file_notes(self.mesh.file, bodies["mesh"].notes)
+        found = list(bodies.values())
         if points is not None:
-            grid = (
-                voxels.grid_of_meshes_and_cloud(list(parts.values()), points, **options)
-                if parts
-                else voxels.grid_of_cloud(points, **options)
-            )
+            grid = voxels.grid_of_bodies_and_cloud(found, points, **options)
         else:
             region = self._water(parts) if "floor" in parts else None
-            grid = voxels.grid_of_meshes(list(parts.values()), region=region, **options)
+            grid = voxels.grid_of_bodies(found, region=region, **options)
         return replace(grid, notes=(*notes, *grid.notes))
+
+    def _bodies(
+        self, parts: Mapping[str, Triangles], policy: MeshPolicy | None = None
+    ) -> dict[str, MeshBody]:
+        """Return the bodies of mesh and sea floor."""
+        found = {
+            name: body_of_mesh(*part, policy=policy)
+            for name, part in parts.items()
+            if name != "mesh"
+        }
+        if self.mesh is not None:
+            body = body_of_mesh(*parts["mesh"], surface=self.mesh.surface, policy=policy)
+            found = {"mesh": replace(body, thickness=self.mesh.thickness), **found}
+        return found
+
+    def mesh_bodies(self, policy: ScenePolicy | None = None) -> dict[str, MeshBody]:
+        """Return the bodies of mesh and sea floor, by the names ``mesh`` and ``floor``.
+
+        Raises
+        ------
+        InputError
+            A file cannot be read.
+        """
+        return self._bodies(dict(self.meshes()), (policy or ScenePolicy()).mesh)
 
     def _water(self, parts: Mapping[str, Any]) -> Floats:
         """Return the box of water above a sea floor; nothing below or beside it is needed."""
@@ -370,9 +418,12 @@ class Scene(FileModel):
             water = np.array([np.minimum(water[0], low), np.maximum(water[1], high)])
         return water
 
-    def _voxel(self) -> float | None:
-        """Return the smallest edge of voxels that the scene's files state, metres."""
+    def _voxel(self, policy: GridPolicy) -> float | None:
+        """Return the smallest edge of voxels that the scene's files state or that shows a mesh of
+        its thickness, metres."""
         given = [f.voxel for f in (self.floor, self.mesh, self.cloud) if f is not None and f.voxel]
+        if not given and self.mesh is not None and self.mesh.thickness is not None:
+            return self.mesh.thickness / (2.0 * policy.sheet_voxels)
         return min(given) if given else None
 
     def _source(self) -> str:
@@ -381,9 +432,9 @@ class Scene(FileModel):
 
     def _files(
         self, policy: FloorPolicy | None = None
-    ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
+    ) -> tuple[dict[str, Triangles], Floats | None, list[str]]:
         """Read mesh, floor and cloud; return triangles by name, points, and notes on omissions."""
-        parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
+        parts: dict[str, Triangles] = {}
         points: Floats | None = None
         notes: list[str] = []
         if self.mesh is not None:
@@ -417,9 +468,12 @@ class Scene(FileModel):
         InputError
             A file cannot be read.
         """
-        return self._files()[2]
+        parts, _, notes = self._files()
+        if self.mesh is not None:
+            notes += _file_notes(self.mesh.file, self._bodies(parts)["mesh"].notes)
+        return notes
 
-    def meshes(self) -> list[tuple[str, tuple[Floats, npt.NDArray[np.int64]]]]:
+    def meshes(self) -> list[tuple[str, Triangles]]:
         """Return mesh and sea floor as triangles.
 
         Returns
@@ -436,9 +490,10 @@ class Scene(FileModel):
         return list(without._files()[0].items())
 
 
-def _file_notes(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
+def _file_notes(file: str, notes: Sequence[str], tally: Tally | None = None) -> list[str]:
     """Return the notes on a file, and how many of its parts are used if not all are."""
-    return [f"{file}: {note}" for note in (*notes, tally.note) if note]
+    used = tally.note if tally is not None else ""
+    return [f"{file}: {note}" for note in (*notes, used) if note]
 
 
 def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:

@@ -82,6 +82,42 @@ class GridPolicy:
 
 
 @dataclass(frozen=True)
+class MeshPolicy:
+    """Policy of open and doubtful meshes. All numbers are positive; shares are of the diagonal.
+
+    Attributes
+    ----------
+    weld_share
+        Distance between vertices that count as one.
+    side_share
+        Distance from a face at which its sides are looked at.
+    samples
+        Number of faces of a part at which its winding number is taken; larger ones first.
+    rays
+        Number of rays from each side of such a face that decide which side is outside.
+    min_closedness
+        Smallest mean winding number just behind the faces of an open part that is a solid with
+        holes. At 0.95 about a tenth of a ball may be missing; a box without a lid is a sheet.
+    min_solid_faces
+        Smallest number of faces of an open part that may be a solid.
+    min_extent_m, max_extent_m
+        Sizes of a mesh, metres, outside of which its unit is doubted.
+    """
+
+    weld_share: float = 1e-6
+    side_share: float = 1e-5
+    samples: int = 1_000
+    rays: int = 32
+    min_closedness: float = 0.95
+    min_solid_faces: int = 4
+    min_extent_m: float = 0.2
+    max_extent_m: float = 250.0
+
+    def __post_init__(self) -> None:
+        check_positive(self)
+
+
+@dataclass(frozen=True)
 class FieldPolicy:
     """Policy of distance fields. All numbers are positive.
 
@@ -184,9 +220,10 @@ class FloorPolicy:
 
 @dataclass(frozen=True)
 class ScenePolicy:
-    """Policy of a scene: its grid, its field, its seams and its sea floor."""
+    """Policy of a scene: its grid, its meshes, its field, its seams and its sea floor."""
 
     grid: GridPolicy = field(default_factory=GridPolicy)
+    mesh: MeshPolicy = field(default_factory=MeshPolicy)
     distances: FieldPolicy = field(default_factory=FieldPolicy)
     seams: SeamPolicy = field(default_factory=SeamPolicy)
     floor: FloorPolicy = field(default_factory=FloorPolicy)

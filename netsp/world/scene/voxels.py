@@ -2,30 +2,33 @@
 
 Distances: every grid point near a surface measures its nearest triangle or point. Sweeps in the
 eight diagonal directions pass the site on to neighbours, which measure their own distance to it (a
-closest point transform). Signs: points around which a closed mesh winds are solid, so overlapping
-parts are united. An open mesh or a cloud has no inside, so water floods the grid from its border,
-and points that it does not reach are solid.
+closest point transform). Signs: points around which a closed surface winds are solid, so
+overlapping parts are united; the holes of open meshes are closed first
+(`netsp.world.scene.mesh_body`). A sheet or a cloud has no inside, so water floods the grid from its
+border, and points that it does not reach are solid.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.base.arrays import Floats, Singles
+from netsp.base.arrays import Bools, Floats, Singles
 from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.errors import InputError
+from netsp.world.scene.face_tree import FaceTree
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.lattice import Dense, Lattice, OnStage, report_stage, sparse_near
+from netsp.world.scene.mesh_body import MeshBody, body_of_mesh, percent
 from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.sites import point_sites, triangle_sites
 
 
-def grid_of_meshes(
-    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+def grid_of_bodies(
+    bodies: list[MeshBody],
     *,
     voxel: float | None = None,
     memory_limit: float = 4.0,
@@ -34,19 +37,42 @@ def grid_of_meshes(
     source: str = "mesh",
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """Return the distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of
-    each."""
-    first = np.cumsum([0, *(len(v) for v, _ in parts)])
-    return grid_of_triangles(
-        np.vstack([v for v, _ in parts]),
-        np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)]),
-        voxel=voxel,
-        memory_limit=memory_limit,
-        on_progress=on_progress,
-        region=region,
-        source=source,
-        policy=policy,
-    )
+    """Return the distance grid of the bodies of several meshes together.
+
+    Parameters
+    ----------
+    bodies : list of MeshBody
+        Bodies (`netsp.world.scene.mesh_body`).
+    voxel : float, optional
+        Edge of a voxel, metres.
+    memory_limit : float
+        Maximum memory, GiB.
+    on_progress : callable, optional
+        Called with (stage, fraction done).
+    region : ndarray, shape (2, 3), optional
+        Box outside of which distances need not be exact, metres.
+    source : str
+        Name of the mesh, for messages.
+    policy : GridPolicy, optional
+        Policy of grids.
+
+    Raises
+    ------
+    InputError
+        The grid is too large, or sheets are too thin for its voxels.
+    """
+    mesh = _Triangles.from_bodies(bodies)
+    policy = policy or GridPolicy()
+    size = _size(mesh.low, mesh.high, voxel, source, policy)
+    shell = _shell(bodies, size, source, policy)
+    place = _Place(mesh.low, mesh.high, size, memory_limit, source)
+    triangles = None if mesh.has_sheet else mesh.solid
+    half = shell / size if mesh.has_sheet else 0.0
+    lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
+    values, notes, grow = mesh.values(lattice, on_progress, source, shell)
+    report_stage(on_progress, "distances", 1.0)
+    box = np.array([mesh.low - grow, mesh.high + grow])
+    return lattice.grid(values, box, tuple(notes))
 
 
 def grid_of_triangles(
@@ -54,13 +80,17 @@ def grid_of_triangles(
     faces: npt.ArrayLike,
     *,
     voxel: float | None = None,
+    thickness: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
     region: Floats | None = None,
     source: str = "mesh",
     policy: GridPolicy | None = None,
 ) -> VoxelGrid:
-    """Return the distance grid of triangles with vertices (n, 3) and faces (m, 3)."""
+    """Return the distance grid of triangles with vertices (n, 3) and faces (m, 3).
+
+    Its notes name the defects of the mesh.
+    """
     v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
     if f.size == 0:
         raise InputError(f"{source}: expected a mesh with triangles, got none")
@@ -72,72 +102,137 @@ def grid_of_triangles(
         raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
     if not np.isfinite(v).all():
         raise InputError(f"{source}: a vertex is not finite")
-    mesh = _Triangles.from_mesh(v, f)
-    low, high = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
-    policy = policy or GridPolicy()
-    half = policy.sheet_voxels if mesh.open_edges else 0.0
-    place = _Place(low, high, _size(low, high, voxel, source, policy), memory_limit, source)
-    triangles = None if mesh.open_edges else mesh.triangles
-    lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
-    values, notes = mesh.values(lattice, on_progress, source, policy.sheet_voxels)
-    grow = half * lattice.size
-    report_stage(on_progress, "distances", 1.0)
-    return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
+    body = replace(body_of_mesh(v, f), thickness=thickness)
+    grid = grid_of_bodies(
+        [body],
+        voxel=voxel,
+        memory_limit=memory_limit,
+        on_progress=on_progress,
+        region=region,
+        source=source,
+        policy=policy,
+    )
+    return replace(grid, notes=(*body.notes, *grid.notes))
 
 
 @dataclass
 class _Triangles:
-    """Triangles (m, 3, 3) of a mesh, their sites, and counts of edges and parts with defects."""
+    """Triangles (m, 3, 3) about solids and of sheets, their sites, the corners (3,) of their box,
+    and the number of parts that were inside out."""
 
-    triangles: Floats
+    solid: Floats
+    sheet: Floats
     sites: Floats
-    open_edges: int
-    uneven: int
+    low: Floats
+    high: Floats
     turned: int
 
     @classmethod
-    def from_mesh(cls, v: Floats, f: npt.NDArray[np.int64]) -> _Triangles:
-        open_edges, uneven = _edges(f, v)
-        turned = 0
-        if not open_edges:
-            f, turned = _outward(f, v)
-        triangles = v[f]
+    def from_bodies(cls, bodies: list[MeshBody]) -> _Triangles:
+        solid = np.concatenate([b.vertices[b.solid] for b in bodies])
+        sheet = np.concatenate([b.vertices[b.sheet] for b in bodies])
         end_if_abandoned()
-        return cls(triangles, triangle_sites(triangles), open_edges, uneven, turned)
+        both = np.concatenate([solid, sheet])
+        turned = sum(b.turned for b in bodies)
+        return cls(solid, sheet, triangle_sites(both), both.min((0, 1)), both.max((0, 1)), turned)
+
+    @property
+    def has_sheet(self) -> bool:
+        """Sheets are among the triangles."""
+        return len(self.sheet) > 0
 
     def values(
-        self, lattice: Lattice, on_progress: OnStage, source: str, sheet_voxels: float
-    ) -> tuple[Singles, list[str]]:
-        """Return the signed distances at the points of a lattice, and notes on what was assumed."""
+        self, lattice: Lattice, on_progress: OnStage, source: str, shell: float
+    ) -> tuple[Singles, list[str], float]:
+        """Return the signed distances at the points of a lattice, notes on what was assumed, and
+        growth beyond the triangles' box, metres."""
         size, notes = lattice.size, []
+        if size > float((self.high - self.low).max()):
+            raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
         values = lattice.closest(self.sites, on_progress, with_owners=False)[0]
-        if self.open_edges:
-            shell = sheet_voxels * size
-            notes.append(
-                f"the mesh is open ({self.open_edges} edges have one triangle only): taken as a "
-                f"shell, {2 * shell:.3g} thick; spaces that water cannot reach count as solid"
-            )
+        grow = 0.0
+        if not len(self.solid):
             values -= np.float32(shell)
+            grow = shell
         else:
-            max_winding = lattice.turn_inside(values, self.triangles)
-            if self.uneven:
+            sheet = self.sites[len(self.solid) :]
+            if len(sheet):
+                solid_sites = self.sites[: len(self.solid)]
+                values = lattice.closest(solid_sites, None, with_owners=False)[0]
+            notes += self._turn_inside(lattice, values)
+            thin = self._thin(lattice, values)
+            if thin.any():
+                share = float(_double_areas(self.solid[thin]).sum())
+                share /= float(_double_areas(self.solid).sum())
                 notes.append(
-                    f"faces at {self.uneven} edges have opposite orientations: taken as solid "
-                    "wherever the winding number is not zero"
+                    f"{percent(share)} of the surface is of parts thinner than a voxel of "
+                    f"{size:.3g}: made {2 * shell:.3g} thick; smaller voxels show them as they are"
                 )
-            if self.turned:
-                notes.append(f"{self.turned} parts are inside out, or cavities: taken as solid")
-            elif max_winding > 1:
-                notes.append("parts of the mesh overlap: taken as their union")
+                sheet = np.concatenate([sheet, self.sites[: len(self.solid)][thin]])
+            if len(sheet):
+                near = lattice.closest(sheet, None, with_owners=False)[0]
+                values = np.minimum(values, near - np.float32(shell))
+                grow = shell
+        if self.has_sheet:
+            notes.append(f"sheets are {2 * shell:.3g} thick")
         end_if_abandoned()
         enclosed = lattice.unreached(values)
         if enclosed.any():
             values[enclosed] = -np.abs(values[enclosed])
-            if not self.open_edges:
-                notes.append("closed cavities count as solid")
-        if not (values < 0.0).any():
-            raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
-        return values, notes
+            notes.append("closed cavities count as solid")
+        return values, notes, grow
+
+    def _turn_inside(self, lattice: Lattice, values: Singles) -> list[str]:
+        """Negate the values inside the solid; return notes on its parts."""
+        max_winding = lattice.turn_inside(values, self.solid)
+        if self.turned:
+            return [f"{self.turned} parts are inside out, or cavities: taken as solid"]
+        return ["parts of the mesh overlap: taken as their union"] if max_winding > 1 else []
+
+    def _thin(self, lattice: Lattice, values: Singles) -> Bools:
+        """Return which triangles (m,) about the solid are the faces of parts thinner than a
+        voxel."""
+        thin = np.zeros(len(self.solid), dtype=bool)
+        normals = np.cross(self.solid[:, 1] - self.solid[:, 0], self.solid[:, 2] - self.solid[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        off = 1e-3 * lattice.size
+        tree: FaceTree | None = None
+        for weights in _TRIED:
+            places = np.einsum("k,mkd->md", weights, self.solid)
+            lowest = lattice.minimum_nearby(values, places, 1)
+            thin |= lowest > 0.0
+            # behind a flat face of a thick part, some point is half a voxel deep
+            shallow = np.flatnonzero(~thin & (lowest > -0.5 * lattice.size))
+            if len(shallow):
+                tree = tree or FaceTree.build(self.solid)
+                inwards = -normals[shallow]
+                lengths = tree.ray_lengths(places[shallow] + off * inwards, inwards)
+                thin[shallow[lengths < lattice.size]] = True
+        return thin
+
+
+_TRIED = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+"""Tolerance of the search for thin parts: the places of a triangle, by weights of its corners."""
+
+
+def _shell(bodies: list[MeshBody], size: float, source: str, policy: GridPolicy) -> float:
+    """Return half the thickness of sheets, metres."""
+    thickness = max((b.thickness for b in bodies if b.thickness is not None), default=None)
+    if thickness is None:
+        return policy.sheet_voxels * size
+    if not thickness >= 2.0 * policy.sheet_voxels * size * (1.0 - 1e-9):
+        raise InputError(
+            f"{source}: thickness: {thickness:.3g} is less than {2 * policy.sheet_voxels:g} voxels "
+            f"of {size:.3g}; expected more, or voxels of at most "
+            f"{0.5 * thickness / policy.sheet_voxels:.3g}"
+        )
+    return 0.5 * thickness
+
+
+def _double_areas(triangles: Floats) -> Floats:
+    """Return twice the areas (m,) of triangles."""
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return np.asarray(np.linalg.norm(np.cross(u, v), axis=1))
 
 
 def grid_of_cloud(
@@ -231,8 +326,8 @@ def _cloud_values(
     return out, notes, grow
 
 
-def grid_of_meshes_and_cloud(
-    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+def grid_of_bodies_and_cloud(
+    bodies: list[MeshBody],
     points: npt.ArrayLike,
     *,
     voxel: float | None = None,
@@ -248,8 +343,8 @@ def grid_of_meshes_and_cloud(
 
     Parameters
     ----------
-    parts : list of (ndarray, ndarray)
-        Vertices (n, 3) and faces (m, 3) of each mesh.
+    bodies : list of MeshBody
+        Bodies of the meshes.
     points : ndarray, shape (k, 3)
         Points of the cloud.
     voxel : float, optional
@@ -266,34 +361,30 @@ def grid_of_meshes_and_cloud(
     Raises
     ------
     InputError
-        As `grid_of_triangles` and `grid_of_cloud` raise it.
+        As `grid_of_bodies` and `grid_of_cloud` raise it.
     """
     p = _points(points, source)
-    first = np.cumsum([0, *(len(v) for v, _ in parts)])
-    v = np.vstack([v for v, _ in parts])
-    f = np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)])
-    mesh = _Triangles.from_mesh(v, f)
-    low = np.minimum(mesh.triangles.min((0, 1)), p.min(0))
-    high = np.maximum(mesh.triangles.max((0, 1)), p.max(0))
+    mesh = _Triangles.from_bodies(bodies)
+    low = np.minimum(mesh.low, p.min(0))
+    high = np.maximum(mesh.high, p.max(0))
     policy = policy or GridPolicy()
-    half = policy.sheet_voxels if mesh.open_edges else 0.0
     size = _size(low, high, voxel, source, policy)
+    shell = _shell(bodies, size, source, policy)
     extra = _spacing(p)
     flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # as triangles, to place blocks
     lattice = _lattice(
         _Place(low, high, size, memory_limit, source),
         np.vstack([mesh.sites, flat]),
         policy,
-        shell=half,
+        shell=shell / size if mesh.has_sheet else 0.0,
         extra=extra,
         has_cloud=True,
     )
-    values, notes = mesh.values(lattice, on_progress, source, policy.sheet_voxels)
+    values, notes, mesh_grow = mesh.values(lattice, on_progress, source, shell)
     cloud, cloud_notes, grow = _cloud_values(
         lattice, p, point_sites(p), _ball(p, size), None, source, policy.sheet_voxels
     )
-    if mesh.open_edges:
-        grow = max(grow, half * lattice.size)
+    grow = max(grow, mesh_grow)
     report_stage(on_progress, "distances", 1.0)
     box = np.array([low - grow, high + grow])
     return lattice.grid(np.minimum(values, cloud), box, (*notes, *cloud_notes))
@@ -377,45 +468,6 @@ def _size(low: Floats, high: Floats, voxel: float | None, source: str, policy: G
     if side <= 0.0:
         raise InputError(f"{source}: all points are the same")
     return voxel if voxel is not None else side / policy.default_voxels
-
-
-def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
-    """Return the numbers of open edges, and of edges at which the triangles disagree on the
-    outside.
-
-    Vertices at the same place count as one, because STL files repeat them.
-    """
-    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
-    f = same.ravel()[faces]
-    f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
-    directed = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
-    turned = directed[:, 0] > directed[:, 1]
-    undirected, index = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
-    uses = np.bincount(index.ravel(), minlength=len(undirected))
-    balance = np.bincount(index.ravel(), np.where(turned, 1, -1), minlength=len(undirected))
-    return int((uses % 2 == 1).sum()), int(((uses % 2 == 0) & (balance != 0)).sum())
-
-
-def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArray[np.int64], int]:
-    """Return the faces with every connected part of positive volume, and the number of parts
-    turned.
-
-    So overlapping parts never cancel, and cavities are solid.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
-    f = same.ravel()[faces]
-    links = coo_array((np.ones(2 * len(f)), (np.r_[f[:, 0], f[:, 1]], np.r_[f[:, 1], f[:, 2]])))
-    count = int(f.max()) + 1
-    links.resize((count, count))
-    _, part = connected_components(links, directed=False)
-    part = part[f[:, 0]]
-    a, b, c = (vertices[faces[:, k]] - vertices.mean(0) for k in range(3))
-    volume = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))
-    wrong = volume[part] < 0.0
-    return np.where(wrong[:, None], faces[:, ::-1], faces), int((volume < 0.0).sum())
 
 
 def _spacing(points: Floats) -> float:

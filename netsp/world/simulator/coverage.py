@@ -8,6 +8,7 @@ here both are counted, with and without occlusion.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,9 +22,12 @@ from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
 from netsp.world.scene.scene import Scene
+from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.shapes import HalfSpace
 from netsp.world.scene.surfaces import drawn_points, extent, surface_of
 from netsp.world.simulator.environment_policy import CoveragePolicy
+from netsp.world.simulator.mesh_patches import facing_triangles, mesh_patches, triangle_areas
+from netsp.world.simulator.outer_water import OuterWater, exposed
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +58,13 @@ def surface_patches(
     places: Floats,
     inspect: tuple[str, ...] | None = None,
     policy: CoveragePolicy = CoveragePolicy(),
+    *,
+    clearance: float = 0.0,
 ) -> Patches:
-    """Return the surface of a scene as triangles with sides of at most `size`, metres.
+    """Return the surface of a scene as patches with sides of about `size`, metres.
 
-    Parts inside another solid are left out.
+    Parts inside another solid are left out. Of a mesh, the outsides of its solids and both sides of
+    its sheets count (`netsp.world.scene.mesh_body`).
 
     Parameters
     ----------
@@ -65,6 +72,11 @@ def surface_patches(
         Positions around which unbounded surfaces are cut off, metres.
     inspect : tuple of str, optional
         Names of the solids to be seen; by default all but half spaces and the sea floor.
+    policy : CoveragePolicy
+        Policy of patches.
+    clearance : float
+        Distance that the robot keeps from solids, metres. Sides of a mesh that it cannot face from
+        where it gets to do not count.
 
     Raises
     ------
@@ -75,16 +87,19 @@ def surface_patches(
     pairs = np.zeros((0, 2), dtype=np.int64)
     for vertices, faces, own_field in _surfaces(scene, field, places, inspect):
         triangles = divided_triangles(vertices[faces], size, policy.max_patches)
-        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        twice = np.linalg.norm(cross, axis=1)
-        good = twice > 1e-12
+        own_areas = triangle_areas(triangles)
+        good = own_areas > 0.5e-12
         middle = triangles[good].mean(axis=1)
         if len(middle):
             # facets of round solids lie a little inside
             outward = own_field.gradient(middle)
             centres.append(middle - own_field.distance(middle)[:, None] * outward)
             normals.append(outward)
-            areas.append(0.5 * twice[good])
+            areas.append(own_areas[good])
+    for c, n, a in _shown_meshes(scene, field, size, places, inspect, policy, clearance):
+        centres.append(c)
+        normals.append(n)
+        areas.append(a)
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
         points = drawn_points(scene)
         sheet = field.distance(points) < -0.5 * (field.voxel or 0.0)
@@ -109,7 +124,7 @@ def surface_patches(
 def _surfaces(
     scene: Scene, field: DistanceField, places: Floats, inspect: tuple[str, ...] | None
 ) -> list[tuple[Floats, Ints, DistanceField]]:
-    """Return vertices, faces and distance field of each surface to be seen, except of a cloud."""
+    """Return vertices, faces and distance field of each solid to be seen."""
     low, high = extent(scene, places)
     solids = scene.all_solids()
     named = {s.name for s in solids}
@@ -117,13 +132,39 @@ def _surfaces(
     for name in inspect or ():
         if name not in named:
             raise InputError(f"inspect: expected names of solids, got {name!r}")
-    found = [
+    return [
         (*surface_of(s.shape, low, high), Scene(solids=(s,)).field())
         for s in solids
         if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
     ]
-    chosen_meshes = ("mesh",) if inspect is None else inspect  # the floor only by name
-    return found + [(*mesh, field) for name, mesh in scene.meshes() if name in chosen_meshes]
+
+
+def _shown_meshes(
+    scene: Scene,
+    field: DistanceField,
+    size: float,
+    places: Floats,
+    inspect: tuple[str, ...] | None,
+    policy: CoveragePolicy,
+    clearance: float,
+) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Yield centres, normals and areas of the patches of each mesh to be seen."""
+    chosen = ("mesh",) if inspect is None else inspect  # the floor only by name
+    if scene.mesh is None and not (scene.floor is not None and "floor" in chosen):
+        return
+    voxel = field.voxel or 0.0
+    for name, body in scene.mesh_bodies().items():
+        if name not in chosen:
+            continue
+        triangles = divided_triangles(facing_triangles(body), size, policy.max_patches)
+        triangles = triangles[triangle_areas(triangles) > 0.5e-12]
+        if not len(triangles):
+            continue
+        thickness = body.thickness or 2.0 * GridPolicy().sheet_voxels * voxel
+        c, n, a = mesh_patches(field, body, triangles, size, 0.5 * thickness + voxel)
+        water = OuterWater.about(field, body, clearance, places, policy)
+        shown = exposed(body, water, c, n, clearance, 0.5 * voxel, policy)
+        yield c[shown], n[shown], a[shown]
 
 
 def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:

@@ -51,9 +51,23 @@ class CoveragePolicy:
     ----------
     max_patches
         Maximum number of large triangles of a surface; a finer surface is refused.
+    max_water_cells
+        Maximum number of cells along the longest side of a mesh in the search for the water that
+        the robot gets to.
+    sight_rays
+        Number of oblique rays from each patch of a mesh that look for such water.
+    sight_steps, sight_growth
+        Number of places along each ray, and ratio of their distances. The first is the clearance.
+    max_sight_deg
+        Maximum angle between a ray and the normal, degrees.
     """
 
     max_patches: int = 200_000
+    max_water_cells: int = 80
+    sight_rays: int = 16
+    sight_steps: int = 8
+    sight_growth: float = 1.5
+    max_sight_deg: float = 75.0
 
     def __post_init__(self) -> None:
         check_positive(self)

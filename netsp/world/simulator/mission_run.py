@@ -191,7 +191,9 @@ def _coverage(
     if mission.camera is None:
         return None
     size, places = mission.camera.patch, mission.every_place
-    patches = surface_patches(scene, field, size, places, mission.inspect, policy.coverage)
+    patches = surface_patches(
+        scene, field, size, places, mission.inspect, policy.coverage, clearance=mission.clearance
+    )
     return Coverage(patches, field, mission.camera)
 
 

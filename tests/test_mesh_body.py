@@ -1,0 +1,227 @@
+"""Meshes as people have them: what is solid, what is a sheet, and what a note says."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError
+from netsp.world import Scene
+from netsp.world.mission.equipment import Camera
+from netsp.world.scene.face_tree import FaceTree
+from netsp.world.scene.mesh_body import body_of_mesh
+from netsp.world.scene.mesh_edges import edges_of, open_loops, pieces_of
+from netsp.world.scene.voxels import grid_of_triangles
+from netsp.world.simulator.coverage import Coverage, surface_patches
+from tests.test_scene import voxel_field
+
+trimesh = pytest.importorskip("trimesh")
+
+BALL = trimesh.creation.icosphere(subdivisions=3)
+ROOMY = st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array)
+
+
+def ball_with_holes(rng, count, size=0.25):
+    """Faces of a ball without those near some directions."""
+    middles = BALL.triangles_center
+    holes = rng.normal(size=(count, 3))
+    holes /= np.linalg.norm(holes, axis=1)[:, None]
+    return BALL.faces[np.linalg.norm(middles[:, None] - holes, axis=2).min(axis=1) > size], holes
+
+
+@settings(max_examples=30, deadline=None)
+@given(p=ROOMY)
+def test_the_winding_number_of_a_closed_mesh_is_1_inside_and_0_outside(p):
+    # the ball is convex: its inside is behind all faces
+    beyond = np.einsum("md,md->m", p - BALL.triangles_center, BALL.face_normals).max()
+    tree = FaceTree.build(np.asarray(BALL.triangles))
+    if abs(beyond) > 1e-3:
+        assert tree.windings(p[None])[0] == pytest.approx(float(beyond < 0), abs=0.03)
+        # without dipoles, the solid angles add up exactly
+        assert tree.windings(p[None], 1e9)[0] == pytest.approx(float(beyond < 0), abs=1e-9)
+
+
+def test_the_winding_number_of_a_disc_is_its_solid_angle():
+    """On the axis at height h, a disc of radius 1 takes up 2 pi (1 - h / sqrt(1 + h^2))."""
+    disc = trimesh.creation.cylinder(1.0, 1.0, sections=400)
+    faces = disc.faces[disc.face_normals[:, 2] > 0.9]
+    tree = FaceTree.build(disc.vertices[faces])
+    for h in (0.1, 1.0, 5.0):
+        expected = 0.5 * (1.0 - h / np.hypot(1.0, h))
+        places = np.array([[0.0, 0.0, 0.5 - h], [0.0, 0.0, 0.5 + h]])
+        assert tree.windings(places) == pytest.approx([expected, -expected], abs=0.005)
+
+
+def test_rays_go_as_far_as_the_nearest_face():
+    rng = np.random.default_rng(0)
+    triangles = rng.normal(size=(60, 3, 3))
+    starts, ahead = rng.normal(size=(200, 3)), rng.normal(size=(200, 3))
+    found = FaceTree.build(triangles).ray_lengths(starts, ahead)
+    expected = np.full(200, np.inf)
+    for a, b, c in triangles:  # s + t d = a + u (b - a) + v (c - a), one system for each ray
+        sides = np.stack([np.broadcast_to(b - a, ahead.shape), np.broadcast_to(c - a, ahead.shape),
+                          -ahead], axis=-1)  # fmt: skip
+        u, v, t = np.linalg.solve(sides, (starts - a)[..., None])[..., 0].T
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+        expected[hit] = np.minimum(expected[hit], t[hit])
+    assert np.isfinite(expected).sum() > 50
+    assert found == pytest.approx(expected)
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10_000), share=st.floats(0.0, 0.4))
+def test_loops_close_whatever_is_missing_and_pieces_agree_on_their_outside(seed, share):
+    rng = np.random.default_rng(seed)
+    faces = BALL.faces[rng.random(len(BALL.faces)) >= share].astype(np.int64)
+    flip = rng.random(len(faces)) < 0.5
+    faces[flip] = faces[flip][:, ::-1]
+    _, turn, one_sided = pieces_of(faces)
+    faces = np.where(turn[:, None], faces[:, ::-1], faces)
+    assert not one_sided.any()
+    assert edges_of(faces).uneven_count == 0
+    fans = [
+        (loop[k - 1], loop[k], 10_000 + n)
+        for n, loop in enumerate(open_loops(faces)) for k in range(len(loop))
+    ]  # fmt: skip
+    closed = edges_of(np.vstack([faces, np.array(fans).reshape(-1, 3).astype(int)]))
+    assert (closed.balance == 0).all()
+
+
+def test_a_moebius_strip_is_a_sheet():
+    angle = np.linspace(0.0, 2.0 * np.pi, 41)[:-1]
+    out = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    lean = np.column_stack([np.cos(angle) * np.cos(angle / 2), np.sin(angle) * np.cos(angle / 2),
+                            np.sin(angle / 2)])  # fmt: skip
+    vertices = np.vstack([out - 0.3 * lean, out + 0.3 * lean])
+    faces = []
+    for k in range(40):
+        a, b, c, d = k, 40 + k, k + 1, 40 + k + 1
+        if k == 39:
+            c, d = 40, 0
+        faces += [(a, b, c), (b, d, c)]
+    body = body_of_mesh(vertices, np.array(faces), surface="solid")
+    assert not len(body.solid)
+    assert len(body.sheet) == 80
+
+
+@settings(max_examples=4, deadline=None)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 4))
+def test_a_ball_with_holes_is_solid_and_right_but_near_its_holes(seed, count):
+    rng = np.random.default_rng(seed)
+    faces, holes = ball_with_holes(rng, count)
+    grid = grid_of_triangles(BALL.vertices, faces, voxel=0.1)
+    assert any("closed, the widest" in n for n in grid.notes)
+    p = rng.uniform(-1.3, 1.3, (2000, 3))
+    depth = 1.0 - np.linalg.norm(p, axis=1)
+    far = np.linalg.norm(p[:, None] - holes, axis=2).min(axis=1) > 0.5
+    p, depth = p[far & (np.abs(depth) > 0.03)], depth[far & (np.abs(depth) > 0.03)]
+    assert (np.sign(voxel_field(grid).distance(p)) == -np.sign(depth)).all()
+
+
+@pytest.mark.parametrize("how", ["inverted", "half turned", "faces apart", "twice"])
+def test_spoiled_meshes_give_the_solid_of_the_sound_one(how):
+    rng = np.random.default_rng(3)
+    vertices, faces = np.asarray(BALL.vertices), np.asarray(BALL.faces)
+    sound = grid_of_triangles(vertices, faces, voxel=0.08)
+    if how == "inverted":
+        faces = faces[:, ::-1]
+    elif how == "half turned":
+        faces = np.where((rng.random(len(faces)) < 0.5)[:, None], faces[:, ::-1], faces)
+    elif how == "faces apart":
+        vertices, faces = vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+    else:
+        faces = np.vstack([faces, faces[:, ::-1]])
+    spoiled = grid_of_triangles(vertices, faces, voxel=0.08)
+    assert np.allclose(spoiled.values, sound.values, atol=1e-6)
+    assert bool(spoiled.notes) == (how != "faces apart")
+
+
+def test_a_hollow_half_ball_is_a_sheet_unless_the_scene_says_solid():
+    half = BALL.faces[BALL.triangles_center[:, 2] < 0.0]
+    assert not len(body_of_mesh(BALL.vertices, half).solid)
+    body = body_of_mesh(BALL.vertices, half, surface="solid")
+    assert not len(body.sheet)
+    volume = np.linalg.det(body.vertices[body.solid]).sum() / 6.0
+    assert volume == pytest.approx(2.0 / 3.0 * np.pi, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"), [(1000.0, "in millimetres"), (0.01, "not in metres"), (1.0, None)]
+)
+def test_a_mesh_in_another_unit_is_named(scale, message):
+    notes = body_of_mesh(scale * BALL.vertices, BALL.faces).notes
+    assert [message] == [message for n in notes if message in n] if message else notes == ()
+
+
+def test_plates_thinner_than_a_voxel_stay_solid_wherever_they_are():
+    plate = trimesh.creation.box((1.0, 1.0, 0.01))
+    for degrees in (0.0, 20.0, 45.0):
+        turn = trimesh.transformations.rotation_matrix(np.radians(degrees), [1, 2, 3])
+        turned = plate.copy().apply_transform(turn)
+        grid = grid_of_triangles(turned.vertices, turned.faces, voxel=0.05)
+        assert any("thinner than a voxel" in n for n in grid.notes)
+        up = turn[:3, 2]
+        near = voxel_field(grid).distance([0.3 * up, -0.3 * up])
+        assert near == pytest.approx(0.195, abs=0.01)
+        assert not voxel_field(grid).line_of_sight(up, -up)
+    thick = grid_of_triangles(plate.vertices, plate.faces, voxel=0.05, thickness=0.4)
+    assert voxel_field(thick).distance([0, 0, 0.35]) == pytest.approx(0.145, abs=0.01)
+    with pytest.raises(InputError, match="thickness"):
+        grid_of_triangles(plate.vertices, plate.faces, voxel=0.05, thickness=0.1)
+
+
+def scene_of_file(tmp_path, mesh, **more):
+    mesh.export(tmp_path / "mesh.stl")
+    return Scene.model_validate({"mesh": {"file": str(tmp_path / "mesh.stl"), **more}})
+
+
+def test_a_stated_thickness_chooses_the_voxels(tmp_path):
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    field = scene_of_file(tmp_path, sheet, thickness=0.06).field()
+    assert field.voxel == pytest.approx(0.015)
+    assert field.distance([0.5, 0.4, 0.2]) == pytest.approx(0.17, abs=1e-3)
+
+
+def seen_from_six_sides(scene, clearance=0.3):
+    field = scene.field()
+    camera = Camera(range=6.0, field_of_view=120.0, patch=0.15)
+    patches = surface_patches(scene, field, 0.15, np.full((1, 3), 4.0), clearance=clearance)
+    coverage = Coverage(patches, field, camera)
+    for axis in range(3):
+        for side in (-3.0, 3.0):
+            eye = side * np.eye(3)[axis]
+            coverage.look(eye, np.arctan2(-eye[1], -eye[0]))
+    return float(patches.areas.sum()), coverage.share
+
+
+def test_only_the_outside_of_a_scan_with_holes_counts(tmp_path):
+    faces, _ = ball_with_holes(np.random.default_rng(1), 3)
+    scan = trimesh.Trimesh(BALL.vertices, faces)
+    area, share = seen_from_six_sides(scene_of_file(tmp_path, scan, voxel=0.05))
+    assert area == pytest.approx(scan.area, rel=0.02)
+    assert share > 0.97
+
+
+def test_both_sides_of_a_sheet_count_and_neither_side_of_a_slit(tmp_path):
+    sheet = trimesh.Trimesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]],
+                            [[0, 1, 2], [0, 2, 3]])  # fmt: skip
+    area, share = seen_from_six_sides(scene_of_file(tmp_path, sheet, voxel=0.03))
+    assert area == pytest.approx(8.0, rel=0.02)
+    assert share > 0.97
+    # of the sides of a slit, 8 square metres, only the rims can be faced, at up to 75 degrees
+    blocks = [trimesh.creation.box((1, 2, 2)).apply_translation((x, 0, 0)) for x in (-0.53, 0.53)]
+    pair = trimesh.util.concatenate(blocks)
+    area, _ = seen_from_six_sides(scene_of_file(tmp_path, pair, voxel=0.03))
+    rim = 4.0 - (2.0 - 2.0 * 0.06 * np.tan(np.radians(75.0))) ** 2
+    assert 23.5 < area < 24.0 + 2.0 * rim + 0.5
+
+
+def test_scenes_name_the_defects_of_a_mesh(tmp_path):
+    faces, _ = ball_with_holes(np.random.default_rng(1), 2)
+    scene = scene_of_file(tmp_path, trimesh.Trimesh(BALL.vertices, faces))
+    assert any("2 holes closed" in n for n in scene.reading_notes())
+    data = {"schema_version": 1, "mesh": {"file": "scan.stl", "surface": "solids"}}
+    with pytest.raises(InputError, match="surface"):
+        Scene.from_json(json.dumps(data))
