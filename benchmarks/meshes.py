@@ -1,0 +1,193 @@
+"""Meshes as people have them: open, inverted, soups, thin, in millimetres; covered, solved and
+flown, beside an independent ray caster (`ray_caster.py`).
+
+    python benchmarks/meshes.py FOLDER [--only NAME …] [--limit 5] [--record FILE] [--keep]
+
+FOLDER holds the files of `MESHES` (docs/notebook/space.md names their sources); those that are
+absent are left out. With `--record`, an interrupted run goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ray_caster import RayCaster
+from table import head, heading, row
+
+from netsp.base.errors import InputError, LimitReachedError
+from netsp.plan.cover import cover
+from netsp.plan.space.mission_solver import solve_mission
+from netsp.world import Scene
+from netsp.world.mission.equipment import Camera
+from netsp.world.scene.readers import read_mesh_file
+from netsp.world.simulator.mission_run import simulate
+from netsp.world.simulator.simulation_policy import SimulationPolicy
+
+EXTENT = 4.0
+"""Longest side of each mesh in its scene, metres."""
+
+CAMERA = Camera(range=4.0, field_of_view=90.0, patch=0.15)
+SPEED = 1.0
+"""Speed of the robot, m/s."""
+
+COVER: dict[str, Any] = {"camera": CAMERA, "standoff": 2.0, "incidence": 75.0, "share": 0.95}
+
+MESHES = (
+    "bunny.ply", "chair_model.obj", "cycloidal.ply", "suzanne.obj", "teapot.obj", "beetle.obj",
+    "soup.stl", "multibody.stl", "counter.unitsmm.STL", "1002_tray_bottom.STL", "woody.obj",
+    "target.obj", "CesiumMilkTruck.glb", "plate_holes.STL", "alligator.obj", "monkey.glb",
+    "cow.obj", "fixed_top.ply", "octagonal_pocket.stl", "busted.STL", "RexROV_no_props.stl",
+    "torus.STL", "quadknot.obj", "rocker-arm.obj", "wallhole.obj", "Duck.glb", "fandisk.obj",
+    "TorqueTool.dae", "HotStab.dae", "ADIS16480.STL", "no_indices_3storybuilding.glb",
+    "cheburashka.obj", "aurora_collision.stl", "stanford-bunny.obj", "beetle-alt.obj", "ogre.obj",
+)  # fmt: skip
+"""Names of the files. Further ones in the folder are left out."""
+
+VARIANTS = {"spot.obj": "inverted", "homer.obj": "half of the faces turned", "rabbit.obj": "soup"}
+"""Defects that are made in sound meshes, because no file has them: each is measured besides."""
+
+
+@dataclass
+class Outcome:
+    """Of one mesh. Areas in square metres, shares in per cent, seconds of CPU."""
+
+    faces: int = 0
+    notes: str = ""
+    field_s: float = 0.0
+    cover_s: float = 0.0
+    solve_s: float = 0.0
+    simulate_s: float = 0.0
+    area: float = 0.0
+    area_by_rays: float = 0.0
+    seen: float = 0.0
+    seen_by_rays: float = 0.0
+    flown: float = 0.0
+    flown_by_rays: float = 0.0
+    solved: str = ""
+    visited: str = ""
+    error: str = ""
+
+
+def spoiled(triangles: Any, how: str) -> Any:
+    """Triangles with a defect."""
+    rng = np.random.default_rng(0)
+    out = triangles.copy()
+    if how == "inverted":
+        return out[:, ::-1]
+    if how == "soup":  # no two faces share a vertex
+        return out + rng.normal(size=(len(out), 1, 3)) * 2e-4 * np.ptp(out.reshape(-1, 3))
+    half = rng.random(len(out)) < 0.5
+    out[half] = out[half][:, ::-1]
+    return out
+
+
+def measured(path: Path, how: str, limit: float, record: Path | None) -> Outcome:
+    """One mesh: covered, solved, flown, and the same by rays; from the record if it is there."""
+    lines = record.read_text().splitlines() if record is not None and record.exists() else []
+    known = {(k["name"], k["how"]): k["outcome"] for k in map(json.loads, lines)}
+    if (path.name, how) in known:
+        return Outcome(**known[path.name, how])
+    out = Outcome()
+    try:
+        _measure(path, how, limit, out)
+    except InputError as error:
+        out.error = str(error)
+    if record is not None:
+        with record.open("a") as end:
+            kept = {"name": path.name, "how": how, "outcome": asdict(out)}
+            end.write(json.dumps(kept) + "\n")
+    return out
+
+
+def _measure(path: Path, how: str, limit: float, out: Outcome) -> None:
+    read = read_mesh_file(path)
+    triangles = read.vertices[read.faces]
+    with tempfile.TemporaryDirectory() as folder:
+        if how:
+            import trimesh
+
+            triangles = spoiled(triangles, how)
+            faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+            path = Path(folder) / "spoiled.stl"
+            trimesh.Trimesh(triangles.reshape(-1, 3), faces, process=False).export(path)
+        _fly(path, triangles, limit, out)
+
+
+def _fly(path: Path, triangles: Any, limit: float, out: Outcome) -> None:
+    scale = EXTENT / float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    triangles = scale * triangles
+    low, high = triangles.min((0, 1)), triangles.max((0, 1))
+    scene = Scene.model_validate({"mesh": {"file": str(path), "scale": scale}})
+    anchor = (float(low[0]) - 1.0, 0.5 * float(low[1] + high[1]), float(high[2]) + 0.8)
+    out.faces = len(triangles)
+    clock = time.process_time
+    begin = clock()
+    field = scene.field()
+    out.field_s, out.notes = (
+        clock() - begin,
+        "; ".join(n.removeprefix(f"{path}: ") for n in field.notes),
+    )
+    begin = clock()
+    found = cover(scene, anchor=anchor, time_limit=4.0 * limit, **COVER)
+    out.cover_s, out.seen = clock() - begin, 100 * found.seen
+    out.area = float(found.patches.areas.sum())
+    begin = clock()
+    mission = found.mission.model_copy(update={"speed": SPEED})
+    try:
+        solved = solve_mission(mission, scene=scene, time_limit=limit)
+        mission, out.solved = solved.mission, f"{solved.tour.length:.1f} m"
+    except LimitReachedError:
+        out.solved = "no tour in time"
+    out.solve_s = clock() - begin
+    begin = clock()
+    run = simulate(mission, scene=scene)
+    out.simulate_s, out.flown = clock() - begin, 100 * run.summary["coverage"]
+    out.visited = f"{run.summary['visited']} of {run.summary['waypoints']}"
+    rays = RayCaster(triangles)
+    out.area_by_rays = rays.area
+    for place, yaw in zip(found.viewpoints.places, found.viewpoints.headings, strict=True):
+        rays.look(place, float(yaw), CAMERA, COVER["incidence"])
+    out.seen_by_rays = 100 * rays.share
+    rays.seen[:] = False
+    for k, step in enumerate(run.log):
+        if k % SimulationPolicy.camera_steps == 0 and step.mode != "home":
+            rays.look(np.array([step.x, step.y, step.z]), step.yaw, CAMERA)
+    out.flown_by_rays = 100 * rays.share
+
+
+def main() -> None:
+    """Run what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="*")
+    parser.add_argument("--limit", type=float, default=5.0)
+    parser.add_argument("--record", type=Path)
+    args = parser.parse_args()
+    names = list(VARIANTS.items()) + [(name, "") for name in MESHES]
+    chosen = [
+        (name, how) for name, how in names
+        if (args.folder / name).is_file() and (args.only is None or name in args.only)
+    ]  # fmt: skip
+    heading("Meshes as people have them")
+    head("mesh", "faces", "outside m²", "by rays", "seen %", "by rays", "flown %", "by rays",
+         "field s", "cover s", "solve s", "simulate s", "tour", "visited", "notes",
+         name="meshes")  # fmt: skip
+    for name, how in chosen:
+        o = measured(args.folder / name, how, args.limit, args.record)
+        row(
+            f"{name}, {how}" if how else name, o.faces, f"{o.area:.1f}", f"{o.area_by_rays:.1f}",
+            f"{o.seen:.1f}", f"{o.seen_by_rays:.1f}", f"{o.flown:.1f}", f"{o.flown_by_rays:.1f}",
+            f"{o.field_s:.1f}", f"{o.cover_s:.0f}", f"{o.solve_s:.0f}", f"{o.simulate_s:.0f}",
+            o.solved, o.visited, o.error or o.notes or "none",
+        )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
