@@ -13,7 +13,7 @@ from netsp.base.compiled.kernel import kernel
 
 @dataclass(frozen=True)
 class Edges:
-    """Edge table for m faces.
+    """Edges of a mesh with m faces.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Edges:
     uses : ndarray, shape (k,)
         Number of faces at each edge.
     balance : ndarray, shape (k,)
-        Number of faces that pass the edge from its first end, minus those that pass it back.
+        Number of faces that pass the edge from its first end, minus the number that pass it back.
     index : ndarray, shape (3, m)
         Number of the first, second and third edge of each face.
     """
