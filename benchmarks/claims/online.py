@@ -229,6 +229,20 @@ def windy(names: tuple[str, ...] = ("basin",)) -> tuple[str, bool]:
     return f"{over:.1f} s, {visited} of {count}", over == 0.0 and visited == count
 
 
+def at_speed() -> tuple[str, bool]:
+    """Flights of the BlueROV2 at cruise speed: narrow turns between plates, boulders in a current."""
+    import currents
+
+    found = []
+    for name, speed, current in (("comb", 1.0, 0), ("boulders 0", 0.8, 3)):
+        mission, scene = currents.mission_of(name)
+        found.append(currents.flown(mission, scene, speed, current))
+    over = max(f["over_s"] for f in found)
+    visited, count = (sum(f[key] for f in found) for key in ("visited", "waypoints"))
+    shown = f"{over:.1f} s, {visited} of {count}, {sum(f['contacts'] for f in found)} contacts"
+    return shown, all(currents.is_good(f) and not f["contacts"] for f in found)
+
+
 def external() -> tuple[str, bool]:
     """The beginning of the tour of others about a cloud of points; the whole takes minutes."""
     import react
@@ -316,6 +330,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("tether: above and below among meshes", "0.5 %, 0.5 %; 0.05 %", meshes)
     yield Claim("tether: drives past thin poles", "none through one", drives)
     yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)
+    yield Claim("BlueROV2 at speed: over the limit; visited; contacts", "0.0 s; all; 0", at_speed)
     yield Claim("unknown solids: over the limit; contacts; free", "0; 0; 90 %", unknown)
     yield Claim("ship: over the limit; visited; tether", SAFE, from_a_ship)
     for name in ("jetty", "hull", "ring", "linked rings", "comb", "tunnel"):
