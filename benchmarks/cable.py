@@ -54,20 +54,19 @@ def mission_named(name: str) -> tuple[Mission, Scene]:
     return mission_of(name) if name in SITES else random_frame(int(name.split()[1]))
 
 
-def paths_of(mission: Mission, scene: Scene) -> dict[str, list[np.ndarray]]:
-    """Return the legs that two planners fly: one that keeps to the tether, and one that does
-    not."""
-    endless = mission.model_copy(update={"tether_length": 1e3})
-    flights = {}
-    for kind, planner, there in (
-        ("predictive", "predictive", mission), ("no planner", "none", endless),
-    ):  # fmt: skip
-        log = simulate(there, planner, scene=scene).log
-        places = np.array([(r.x, r.y, r.z) for r in log])
-        turns = np.flatnonzero(np.diff([r.waypoint for r in log])) + 1
-        cuts = [0, *turns, len(places) - 1]
-        flights[kind] = [places[a : b + 1] for a, b in pairwise(cuts) if b > a]
-    return flights
+FLIGHTS = {"predictive": "predictive", "no planner": "none"}
+"""Planners by the name of their flights."""
+
+
+def legs_flown(mission: Mission, scene: Scene, planner: str) -> list[np.ndarray]:
+    """Return the legs that a planner flies; one that ignores the tether has an endless one."""
+    if planner == "none":
+        mission = mission.model_copy(update={"tether_length": 1e3})
+    log = simulate(mission, planner, scene=scene).log
+    places = np.array([(r.x, r.y, r.z) for r in log])
+    turns = np.flatnonzero(np.diff([r.waypoint for r in log])) + 1
+    cuts = [0, *turns, len(places) - 1]
+    return [places[a : b + 1] for a, b in pairwise(cuts) if b > a]
 
 
 def samples_of(legs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -96,54 +95,54 @@ def cable_lengths(
     return np.array(lengths)
 
 
-def compared(name: str, frictions: list[float]) -> list[list[str]]:
-    """Return the rows of a scene."""
+def compared(name: str, kind: str, frictions: list[float]) -> list[list[str]]:
+    """Return the rows of a flight in a scene."""
     mission, scene = mission_named(name)
     field, rows = scene.field(), []
     model = HoldingTether(field, mission.delta, bracket=BracketPolicy())
     context = replace(PlanningContext.for_mission(mission, scene, field), model=model)
-    for kind, legs in paths_of(mission, scene).items():
-        places, stops = samples_of(legs)
-        fine, at, here = [], [], legs[0][0]
-        for place in places:
-            fine += [*polylines.dense(np.vstack([here, place]), 0.5 * mission.delta)]
-            at.append(len(fine) - 1)
-            here = place
-        tether = model.drive(
-            model.start(mission.anchor, mission.anchor),
-            polylines.dense(np.vstack([mission.anchor, legs[0][0]]), mission.delta),
-        )[0]
-        index = np.array(at)
-        begin = time.process_time()
-        path = np.array(fine)
-        shorter = shortest_of_class(context, tether, path, list(index))
-        found = model.along(tether, path, stops=list(index[stops]), shorter=shorter)
-        spent = time.process_time() - begin
-        lower, taut, upper = found.lower[index], found.taut[index], found.upper[index]
-        counts = taut > SHORT
-        for friction in frictions:
-            cable = cable_lengths(
-                scene, field, legs[0][0], mission.anchor, places, stops,
-                SPARE * float(taut.max()), friction,
-            )  # fmt: skip
+    legs = legs_flown(mission, scene, FLIGHTS[kind])
+    places, stops = samples_of(legs)
+    fine, at, here = [], [], legs[0][0]
+    for place in places:
+        fine += [*polylines.dense(np.vstack([here, place]), 0.5 * mission.delta)]
+        at.append(len(fine) - 1)
+        here = place
+    tether = model.drive(
+        model.start(mission.anchor, mission.anchor),
+        polylines.dense(np.vstack([mission.anchor, legs[0][0]]), mission.delta),
+    )[0]
+    index = np.array(at)
+    begin = time.process_time()
+    path = np.array(fine)
+    shorter = shortest_of_class(context, tether, path, list(index[stops]))
+    found = model.along(tether, path, stops=list(index[stops]), shorter=shorter)
+    spent = time.process_time() - begin
+    lower, taut, upper = found.lower[index], found.taut[index], found.upper[index]
+    counts = taut > SHORT
+    for friction in frictions:
+        cable = cable_lengths(
+            scene, field, legs[0][0], mission.anchor, places, stops,
+            SPARE * float(taut.max()), friction,
+        )  # fmt: skip
 
-            def worst(where: np.ndarray, cable=cable, reference=taut) -> str:
-                share = 100.0 * (cable / reference - 1.0)[where]
-                return f"{share.max(initial=0.0):.1f}, {share.min(initial=0.0):.1f}"
+        def worst(where: np.ndarray, cable=cable, reference=taut) -> str:
+            share = 100.0 * (cable / reference - 1.0)[where]
+            return f"{share.max(initial=0.0):.1f}, {share.min(initial=0.0):.1f}"
 
-            def beyond(where: np.ndarray, cable=cable, lower=lower, upper=upper) -> str:
-                over = max(0.0, float((cable / upper - 1.0)[where].max(initial=0.0)))
-                under = max(0.0, float((1.0 - cable / lower)[where].max(initial=0.0)))
-                return f"{100 * over:.1f}, {100 * under:.1f}"
+        def beyond(where: np.ndarray, cable=cable, lower=lower, upper=upper) -> str:
+            over = max(0.0, float((cable / upper - 1.0)[where].max(initial=0.0)))
+            under = max(0.0, float((1.0 - cable / lower)[where].max(initial=0.0)))
+            return f"{100 * over:.1f}, {100 * under:.1f}"
 
-            is_out = (cable > 1.01 * upper) | (cable < 0.99 * lower)
-            rows.append([
-                name, kind, f"{friction:g}", f"{taut.max():.2f}", f"{upper.max():.2f}",
-                f"{cable.max():.2f}", worst(stops & counts), worst(~stops & counts),
-                beyond(stops & counts), beyond(~stops & counts),
-                f"{int((is_out & counts).sum())} of {int(counts.sum())}",
-                f"{taut[-1]:.2f}, {cable[-1]:.2f}, {upper[-1]:.2f}", f"{spent:.0f}",
-            ])  # fmt: skip
+        is_out = (cable > 1.01 * upper) | (cable < 0.99 * lower)
+        rows.append([
+            name, kind, f"{friction:g}", f"{taut.max():.2f}", f"{upper.max():.2f}",
+            f"{cable.max():.2f}", worst(stops & counts), worst(~stops & counts),
+            beyond(stops & counts), beyond(~stops & counts),
+            f"{int((is_out & counts).sum())} of {int(counts.sum())}",
+            f"{taut[-1]:.2f}, {cable[-1]:.2f}, {upper[-1]:.2f}", f"{spent:.0f}",
+        ])  # fmt: skip
     return rows
 
 
@@ -152,6 +151,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", nargs="*", default=SCENES)
     parser.add_argument("--frictions", nargs="*", type=float, default=[0.0, 0.1, 0.2, 0.3])
+    parser.add_argument("--flights", nargs="*", default=list(FLIGHTS), choices=FLIGHTS)
     parser.add_argument("--store", type=Path, help="file of rows to resume from")
     args = parser.parse_args()
     done = json.loads(args.store.read_text()) if args.store and args.store.exists() else {}
@@ -162,12 +162,14 @@ def main() -> None:
          "out by > 1 %", "left at home: taut, cable, upper m", "bracket CPU s",
          name="cable")  # fmt: skip
     for name in args.scenes:
-        if name not in done:
-            done[name] = compared(name, args.frictions)
-            if args.store:
-                args.store.write_text(json.dumps(done))
-        for cells in done[name]:
-            row(*cells)
+        for kind in args.flights:
+            key = f"{name}/{kind}"
+            if key not in done:
+                done[key] = compared(name, kind, args.frictions)
+                if args.store:
+                    args.store.write_text(json.dumps(done))
+            for cells in done[key]:
+                row(*cells)
 
 
 if __name__ == "__main__":
