@@ -230,7 +230,7 @@ def windy(names: tuple[str, ...] = ("basin",)) -> tuple[str, bool]:
 
 
 def at_speed() -> tuple[str, bool]:
-    """Flights of the BlueROV2 at cruise speed: narrow turns between plates, boulders in a current."""
+    """Flights of the BlueROV2 at speed: narrow turns between plates, boulders in a current."""
     import currents
 
     found = []
