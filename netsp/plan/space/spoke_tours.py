@@ -28,8 +28,9 @@ from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.states import hang_alike
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.travel_graph import TravelGraph
+from netsp.world.mission.mission_tether import mission_tether
 from netsp.world.paths.tree import ShortestTree
-from netsp.world.tether import GeodesicTether, Tether
+from netsp.world.tether import Tether
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class Spokes:
     def contexts(self) -> tuple[PlanningContext, PlanningContext]:
         """Return the context at the resolutions of the mission and of the judge."""
         context = self.context
-        finer = GeodesicTether(context.field, self.judge.delta_ratio * context.mission.delta)
+        finer = mission_tether(context.mission, context.field, self.judge.delta_ratio)
         return context, replace(context, model=finer)
 
     @cached_property
