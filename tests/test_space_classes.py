@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
-from netsp.plan.space.class_bound import add_windings, packed_windings, winding_legs
+from netsp.plan.space.class_bound import add_windings, packed_windings
 from netsp.plan.space.core_detours import detour_lengths
 from netsp.plan.space.mission_policy import ClassPolicy, PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import bound_all_tours
@@ -18,7 +18,8 @@ from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.reduced_leg_costs import reduced_leg_costs
 from netsp.plan.space.solid_cores import closest_points, solid_cores
 from netsp.plan.space.space_legs import RobotPaths
-from netsp.plan.space.winding_numbers import Crossings, Loops
+from netsp.plan.space.winding_numbers import Crossings, Loops, costliest_loop, piercings
+from netsp.plan.space.wound_loops import WoundLoops
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
@@ -68,6 +69,28 @@ def test_crossings_of_a_closed_path_are_its_linking_numbers(seed):
         while len(polygon) < len(begins):
             polygon.append(after[tuple(polygon[-1])])
         assert total == linking_number(path, np.array(polygon))
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_the_costliest_loop_is_one_that_the_path_winds_around(seed):
+    cores = solid_cores(window().field(), DIP).loops()
+    loops, rng = Loops.of_cores(cores), np.random.default_rng(seed)
+    path = rng.uniform(-4.0, 4.0, (5, 3))
+    pairs = np.column_stack([np.arange(5), np.roll(np.arange(5), -1)])
+    pierced = piercings(cores, path, pairs, ClassPolicy()).sum(0)
+    counts = Crossings(loops, path, pairs, ClassPolicy()).counts.sum(0)
+    assert (pierced @ loops.incidence == counts).all()
+    costs = rng.uniform(0.0, 1.0, len(cores.edges))
+    found = costliest_loop(cores, pierced, costs)
+    # the window has three loops: its halves and its rim
+    every = [loops.incidence @ np.array(c) for c in ((1, 0), (0, 1), (1, 1), (1, -1))]
+    rims = [costs[loop != 0].min() for loop in every if abs(loop).max() == 1 and pierced @ loop]
+    if found is None:
+        assert (counts == 0).all()
+    else:
+        assert pierced @ found[0] != 0
+        assert found[1] == max(rims) == costs[found[0] != 0].min()
 
 
 def test_bars_rings_and_the_floor_that_they_stand_on_have_cores_in_depth():
@@ -187,16 +210,19 @@ def test_a_tour_may_not_thread_a_ring():
 
 def test_a_tether_that_winds_is_out_of_reach_if_it_would_be_too_long():
     _, paths = mission_at_a_ring()
-    points = np.array([(0, -3, 0), (0, 1.0, 1.0)], dtype=float)
-    legs = winding_legs(paths.context, points, ClassPolicy())
-    assert legs is not None
+    points = np.array([(0, -3, 0), (0, 1.0, 1.0), (0, 0.5, 3.0)], dtype=float)
+    loops = WoundLoops.of_mission(paths.context, points, ClassPolicy())
+    assert loops is not None
+    loops.loops.append(Loops.of_cores(loops.cores).incidence[:, 0])
+    costs = np.linalg.norm(points[:, None] - points[None], axis=2)
+    legs = loops.graph(costs, np.zeros((3, 3)), Clock()).legs
     straight = float(np.linalg.norm(points[1] - points[0]))
     bounds, others = legs.other_windings(0, 1, straight, -DIP, 9.0, 27)
     # over the tube, whose core is two metres above the middle
     over = math.hypot(3.0, 2.0) + math.hypot(1.0, 1.0)
     assert set(bounds) == {0, 1, 2}
     assert others == 9.0
-    assert over <= min(bounds[1], bounds[2]) <= over + 0.3
+    assert over <= min(bounds[1].length, bounds[2].length) <= over + 0.3
 
 
 @pytest.mark.parametrize("name", ["max_raise_ratio", "tolerance"])

@@ -24,10 +24,8 @@ from netsp.base.errors import NetspError
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.core_detours import detour_lengths
 from netsp.plan.space.mission_policy import ClassPolicy
-from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, PlanningContext
 from netsp.plan.space.potential import BOUND_ROUNDING
-from netsp.plan.space.reduced_leg_costs import ReducedCosts, reduced_leg_costs
-from netsp.plan.space.solid_cores import solid_cores
+from netsp.plan.space.reduced_leg_costs import ReducedCosts
 from netsp.plan.space.winding_numbers import Crossings, Loops
 from netsp.roadmap.travel_graph import TravelGraph
 
@@ -60,6 +58,25 @@ def add_windings(a: int, b: int, n: int) -> int:
     return total - 3 * (((total + 5 * ones) & (8 * ones)) >> 3)
 
 
+class Detour(NamedTuple):
+    """Bound on paths that wind in some way, and the bars that they are led over.
+
+    Attributes
+    ----------
+    length
+        Bound on the paths, or on what they are longer than others, metres.
+    bars
+        Segments of the cores, as pairs of number and direction.
+    """
+
+    length: float
+    bars: tuple[tuple[int, int], ...] = ()
+
+    def backward(self, subtracted: float = 0.0) -> Detour:
+        """Return the same for the paths in the other direction."""
+        return Detour(self.length - subtracted, tuple((e, -sign) for e, sign in self.bars))
+
+
 @dataclass
 class WindingLegs:
     """Bounds on paths between some points by their windings.
@@ -82,8 +99,7 @@ class WindingLegs:
     policy: ClassPolicy
     n: int = field(init=False)
     _straight: dict[tuple[int, int], int] = field(init=False)
-    _group: Ints = field(init=False)
-    _windings: list[int] = field(init=False)
+    _bars: list[int] = field(init=False)
 
     def __post_init__(self) -> None:
         crossings = Crossings(self.loops, self.points, self.pairs, self.policy)
@@ -92,12 +108,8 @@ class WindingLegs:
         for (u, v), counts in zip(self.pairs.tolist(), crossings.counts, strict=True):
             self._straight[u, v] = packed_windings(counts)
             self._straight[v, u] = packed_windings(-counts)
-        # bars with the same windings around them are one obstacle
-        bars = [packed_windings(row) for row in self.loops.incidence[:, crossings.used]]
-        bars = [min(b, add_windings(b, b, self.n)) for b in bars]
-        self._windings = sorted(set(bars) - {0})
-        number = {w: k for k, w in enumerate(self._windings)}
-        self._group = np.array([number.get(b, -1) for b in bars], dtype=np.int64)
+        rows = self.loops.incidence[:, crossings.used]
+        self._bars = [packed_windings(row) for row in rows.tolist()]
 
     def sum(self, *windings: int) -> int:
         """Return the sum of packed winding numbers."""
@@ -116,7 +128,7 @@ class WindingLegs:
 
     def other_windings(
         self, u: int, v: int, on_all: float, room: float, longest: float, max_count: int
-    ) -> tuple[dict[int, float], float]:
+    ) -> tuple[dict[int, Detour], float]:
         """Return bounds on paths between two points that wind otherwise than the straight segment.
 
         Parameters
@@ -132,8 +144,8 @@ class WindingLegs:
 
         Returns
         -------
-        bounds : dict of int to float
-            The bound, metres, by what the windings differ from those of the segment; `on_all`
+        bounds : dict of int to Detour
+            The bound by what the windings differ from those of the segment; `on_all`
             for 0.
         others : float
             Bound on the paths with any other windings, metres.
@@ -143,19 +155,22 @@ class WindingLegs:
         a, b, away = self.points[u], self.points[v], np.maximum(0.0, cores.depth + room)
         begins, ends = ends[:, 0], ends[:, 1]
         lengths = detour_lengths(a, b, begins, ends, away, longest, self.policy.tolerance)
-        bar = np.full(len(self._windings), math.inf)
-        used = self._group >= 0
-        np.minimum.at(bar, self._group[used], lengths[used])
-        bounds = {0: on_all}
-        for k in np.argsort(bar, kind="stable"):
-            length = max(on_all, float(bar[k]))
+        order = [int(e) for e in np.argsort(lengths, kind="stable") if self._bars[e]]
+        bounds, seen = {0: Detour(on_all)}, set[int]()
+        for e in order:
+            length, turn = max(on_all, float(lengths[e])), self._bars[e]
             if length >= longest:
                 return bounds, longest
+            if turn in seen:
+                continue
             if 3 * len(bounds) > max_count:
                 return bounds, length
-            for before in list(bounds):
-                for turn in (self._windings[k], self.negative(self._windings[k])):
-                    bounds.setdefault(self.sum(before, turn), length)
+            inverse = self.negative(turn)
+            seen |= {turn, inverse}
+            for before, detour in list(bounds.items()):
+                for w, sign in ((turn, 1), (inverse, -1)):
+                    to = Detour(length, (*detour.bars, (e, sign)))
+                    bounds.setdefault(self.sum(before, w), to)
         return bounds, longest
 
 
@@ -187,8 +202,8 @@ class WindingGraph:
     max_tether: float
     dip: float
     policy: ClassPolicy
-    _legs: dict[tuple[int, int], dict[int, float]] = field(default_factory=dict)
-    _tethers: dict[int, tuple[dict[int, float], float]] = field(default_factory=dict)
+    _legs: dict[tuple[int, int], dict[int, Detour]] = field(default_factory=dict)
+    _tethers: dict[int, tuple[dict[int, Detour], float]] = field(default_factory=dict)
     complete: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -203,8 +218,10 @@ class WindingGraph:
                 bounds, others = self.legs.other_windings(
                     u, v, cost, float(self.rooms[u, v]), cost + spare, self.policy.max_leg_windings
                 )
-                self._legs[u, v] = {w: length - cost for w, length in bounds.items()}
-                self._legs[v, u] = {self.legs.negative(w): d for w, d in self._legs[u, v].items()}
+                self._legs[u, v] = {w: Detour(d.length - cost, d.bars) for w, d in bounds.items()}
+                self._legs[v, u] = {
+                    self.legs.negative(w): d.backward(cost) for w, d in bounds.items()
+                }
                 # no tour that is shorter has a leg with other windings
                 self.complete = min(self.complete, bound + float(reduced[u, v]) + others - cost)
 
@@ -224,7 +241,8 @@ class WindingGraph:
             windings,
             self.legs.negative(self.legs.straight(anchor, place)),
         )
-        return bounds.get(total, others) <= self.max_tether
+        known = bounds.get(total)
+        return (others if known is None else known.length) <= self.max_tether
 
     def states(self, longest: float) -> dict[tuple[int, int], float] | None:
         """Return the states that tours up to a length may pass; None if they are too many.
@@ -256,12 +274,18 @@ class WindingGraph:
                 if near > half or (u, v) not in self._legs:
                     continue
                 after = self.legs.sum(w, self.legs.straight(u, v))
-                for turn, detour in self._legs[u, v].items():
+                for turn, (detour, _) in self._legs[u, v].items():
                     to = v, self.legs.sum(after, turn)
                     if near + detour < min(nearest.get(to, math.inf), half) and self.reaches(*to):
                         nearest[to] = near + detour
                         heapq.heappush(queue, (near + detour, *to))
         return found
+
+    def leg(self, begin: tuple[int, int], end: tuple[int, int]) -> Detour | None:
+        """Return what a leg between two states is longer than others; None if it is too long."""
+        (u, w), (v, x) = begin, end
+        turn = self.legs.sum(x, self.legs.negative(w), self.legs.negative(self.legs.straight(u, v)))
+        return self._legs.get((u, v), {}).get(turn)
 
     def travel_graph(self, states: dict[tuple[int, int], float], longest: float) -> TravelGraph:
         """Return the travel graph of some states, with all legs of tours up to a length."""
@@ -270,17 +294,17 @@ class WindingGraph:
         costs = np.full((len(order), len(order)), np.inf)
         for i, (u, w) in enumerate(order):
             for j, (v, x) in enumerate(order[:i]):
-                known = self._legs.get((u, v))
+                known = self.leg((v, x), (u, w))
                 if known is None:
                     continue
-                turn = self.legs.sum(
-                    x, self.legs.negative(w), self.legs.negative(self.legs.straight(u, v))
-                )
-                detour = known.get(turn, math.inf)
-                raised = states[u, w] + float(reduced[u, v]) + detour + states[v, x]
+                raised = states[u, w] + float(reduced[u, v]) + known.length + states[v, x]
                 if bound + raised <= longest:
-                    costs[i, j] = costs[j, i] = self.costs[u, v] + detour
+                    costs[i, j] = costs[j, i] = self.costs[u, v] + known.length
         return TravelGraph.from_costs(costs, [u for u, _ in order])
+
+
+TourLeg = tuple[int, int, tuple[tuple[int, int], ...]]
+"""Leg of a tour: two places, and the bars that it is led over, as in `Detour`."""
 
 
 class WindingBound(NamedTuple):
@@ -290,12 +314,12 @@ class WindingBound(NamedTuple):
     ----------
     length
         No tour is shorter, metres.
-    legs
-        Legs of a shortest tour of the travel graph, as pairs of places; empty if there is none.
+    tour
+        Legs of a shortest tour of the travel graph; empty if there is none.
     """
 
     length: float
-    legs: list[tuple[int, int]]
+    tour: list[TourLeg]
 
 
 def bound_by_windings(graph: WindingGraph, clock: Clock, seed: int = 0) -> WindingBound:
@@ -311,7 +335,8 @@ def bound_by_windings(graph: WindingGraph, clock: Clock, seed: int = 0) -> Windi
     clock : Clock
         Clock of the run; when it is up, the bound proven so far is returned.
     """
-    bound, best, legs = graph.reduced.bound, graph.reduced.bound, list[tuple[int, int]]()
+    best = bound = graph.reduced.bound
+    tour: list[TourLeg] = []
     spare = (graph.complete - bound) * 0.5**graph.policy.max_halvings
     while spare > 0.0 and not clock.is_up:
         longest = min(graph.complete, bound + spare)
@@ -329,73 +354,14 @@ def bound_by_windings(graph: WindingGraph, clock: Clock, seed: int = 0) -> Windi
             else:
                 best = max(best, min(longest, result.lower_bound or 0.0))
                 if result.tour is not None:
-                    places = travel.cluster[[*result.tour, 0]].tolist()
-                    legs = list(pairwise(places))
-                if result.tour is not None and (result.length or math.inf) < longest:
-                    break
+                    order = sorted(states)
+                    tour = []
+                    for i, j in pairwise((*result.tour, 0)):
+                        leg = graph.leg(order[i], order[j])
+                        tour.append((order[i][0], order[j][0], leg.bars if leg else ()))
+                    if (result.length or math.inf) < longest:
+                        break
         if longest >= graph.complete:
             break
         spare *= 2.0
-    return WindingBound(best * (1.0 - BOUND_ROUNDING), legs)
-
-
-def winding_legs(
-    context: PlanningContext, points: Floats, policy: ClassPolicy
-) -> WindingLegs | None:
-    """Return the bounds on legs and tethers by windings; None if no bars of the scene form a loop.
-
-    Parameters
-    ----------
-    points : ndarray of shape (v, 3)
-        The start, then the places, metres.
-    """
-    loops = Loops.of_cores(solid_cores(context.field, deepest_dip(context), policy).loops())
-    if not loops.incidence.size:
-        return None
-    nodes, n = np.asarray(context.start_tether.nodes), len(points)
-    one, other = np.triu_indices(n, 1)
-    laid = np.arange(n, n + len(nodes) - 1)
-    pairs = np.vstack(
-        [
-            np.column_stack([one, other]),
-            np.column_stack([np.arange(n), np.full(n, n)]),
-            np.column_stack([laid, laid + 1]),
-        ]
-    )
-    legs = WindingLegs(loops, np.vstack([points, nodes]), pairs, policy)
-    return legs if legs.n else None
-
-
-def winding_graph(
-    context: PlanningContext,
-    legs: WindingLegs,
-    costs: Floats,
-    rooms: Floats,
-    policy: ClassPolicy,
-    clock: Clock,
-) -> WindingGraph:
-    """Return the graph whose tours bound all tours.
-
-    Parameters
-    ----------
-    legs : WindingLegs
-        Bounds by windings (`winding_legs`).
-    costs : ndarray of shape (v, v)
-        Bounds on legs between the start and the places whatever their windings, metres.
-    rooms : ndarray of shape (v, v)
-        Least distance of the robot on legs from solids, metres.
-    """
-    return WindingGraph(
-        legs,
-        costs,
-        rooms,
-        reduced_leg_costs(costs, clock),
-        context.mission.tether_length * (1.0 + 1e-6),
-        deepest_dip(context),
-        policy,
-    )
-
-
-def deepest_dip(context: PlanningContext) -> float:
-    """Return the depth to which the judge lets paths and tethers enter solids, metres."""
-    return max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * context.mission.delta)
+    return WindingBound(best * (1.0 - BOUND_ROUNDING), tour)

@@ -268,6 +268,10 @@ class ClassPolicy:
         Largest raise of a bound, as a share of it; more than 0.
     max_halvings
         How often the raise is halved for the first attempt. Each later attempt doubles it.
+    max_loops
+        Maximum number of loops that are counted; a few more may be added in the last round.
+    max_new_loops
+        Maximum number of loops that are added because a tour winds around them at its end.
     max_states
         Maximum number of states of a travel graph. More states allow a higher bound and take more
         time.
@@ -292,6 +296,8 @@ class ClassPolicy:
     share: float = 0.5
     max_raise_ratio: float = 0.3
     max_halvings: int = 6
+    max_loops: int = 8
+    max_new_loops: int = 2
     max_states: int = 400
     max_leg_windings: int = 243
     max_tether_windings: int = 2187

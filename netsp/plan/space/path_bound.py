@@ -24,12 +24,13 @@ from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.class_bound import WindingLegs, bound_by_windings, winding_graph, winding_legs
+from netsp.plan.space.class_bound import bound_by_windings
 from netsp.plan.space.mission_policy import BoundPolicy, ClassPolicy, PotentialPolicy
 from netsp.plan.space.planning_context import is_straight_clear
 from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
 from netsp.plan.space.upright import bound_by_upright_solids, judged_room
+from netsp.plan.space.wound_loops import WoundLoops
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.travel_graph import TravelGraph
 
@@ -86,13 +87,13 @@ def bound_all_tours(
     )
     legs = LegBounds(robot_paths, place_numbers, potential, policy)
     classes = classes or defaults.classes
-    by_windings = None
+    loops = None
     if _has_one_place_each(legs) and len(place_numbers) > 1:
-        by_windings = winding_legs(robot_paths.context, legs.points, classes)
-    part = clock if by_windings is None else clock.part(1.0 - classes.share)
+        loops = WoundLoops.of_mission(robot_paths.context, legs.points, classes)
+    part = clock if loops is None else clock.part(1.0 - classes.share)
     bounds = [upright or 0.0, _bound_without_tether(legs, part, seed) or 0.0]
-    if by_windings is not None:
-        bounds.append(_bound_with_windings(legs, by_windings, classes, clock, seed))
+    if loops is not None:
+        bounds.append(_bound_with_windings(legs, loops, clock, seed))
     return max(bounds) or None
 
 
@@ -245,24 +246,22 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
             return best or None
 
 
-def _bound_with_windings(
-    legs: LegBounds, windings: WindingLegs, policy: ClassPolicy, clock: Clock, seed: int
-) -> float:
+def _bound_with_windings(legs: LegBounds, loops: WoundLoops, clock: Clock, seed: int) -> float:
     """Return the bound that the lower bounds of legs and their windings prove; 0 without time.
 
     As `_bound_without_tether`, raise the bounds of the legs of the shortest tour, and solve again.
+    If none can be raised, add loops that this tour winds around.
     """
     best, count = 0.0, len(legs.points)
     rooms = np.array([[legs.room(u, v) for v in range(count)] for u in range(count)])
     while not clock.is_up:
-        graph = winding_graph(legs.paths.context, windings, legs.costs, rooms, policy, clock)
-        found, grown = bound_by_windings(graph, clock, seed), False
-        best = max(best, found.length)
-        while not grown and not all(legs.final[u, v] for u, v in found.legs):
-            for u, v in found.legs:
+        found = bound_by_windings(loops.graph(legs.costs, rooms, clock), clock, seed)
+        best, grown = max(best, found.length), False
+        while not grown and not all(legs.final[u, v] for u, v, _ in found.tour):
+            for u, v, _ in found.tour:
                 if clock.is_up:
                     return best
                 grown = legs.raise_bound(u, v, clock) or grown
-        if not grown:
+        if not grown and not loops.choose(found.tour, legs.costs, rooms):
             break
     return best

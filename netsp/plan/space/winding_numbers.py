@@ -137,8 +137,10 @@ class Crossings:
             centre, size = begins.mean(0), float(np.ptp(begins, axis=0).max())
             for _ in range(policy.max_tips):
                 tip = centre + 0.2 * size * rng.uniform(-1.0, 1.0, 3)
-                count = _crossings(begins, ends, tip, points, pairs)
-                if count is not None:
+                crossed = _crossings(begins, ends, tip, points, pairs)
+                if crossed is not None:
+                    count = np.zeros(len(pairs), dtype=np.int64)
+                    np.add.at(count, crossed[0], crossed[2])
                     used.append(loop)
                     counts.append(count)
                     break
@@ -148,8 +150,9 @@ class Crossings:
 
 def _crossings(
     begins: Floats, ends: Floats, tip: Floats, points: Floats, pairs: Ints
-) -> Ints | None:
-    """Return how often segments cross a cone, with signs; None if that is uncertain."""
+) -> tuple[Ints, Ints, Ints] | None:
+    """Return the segments that cross triangles of a cone, the triangles, and the signs (k,) of the
+    crossings; None if these are uncertain."""
     c, d, p = begins - tip, ends - tip, points - tip
     normal, sizes = np.cross(c, d), np.linalg.norm(p, axis=1)
     side = p @ normal.T
@@ -173,6 +176,105 @@ def _crossings(
     if not is_sure.all():
         return None
     inside = ((past > 0.0) == rising[:, None]).all(1)
-    out = np.zeros(len(pairs), dtype=np.int64)
-    np.add.at(out, segment[inside], np.where(rising[inside], 1, -1))
+    return segment[inside], triangle[inside], np.where(rising[inside], 1, -1)
+
+
+def piercings(cores: Cores, points: Floats, pairs: Ints, policy: ClassPolicy) -> Ints | None:
+    """Return how often each core pierces the triangles from straight segments to a common tip.
+
+    For a closed path, the sum over its segments and over the cores of a loop, in their directions,
+    is the winding number around the loop.
+
+    Parameters
+    ----------
+    cores : Cores
+        The cores.
+    points : ndarray of shape (n, 3)
+        Ends of the segments, metres.
+    pairs : ndarray of int, shape (p, 2)
+        Ends of each segment, as in `points`.
+    policy : ClassPolicy
+        Number and seed of the tips tried.
+
+    Returns
+    -------
+    ndarray of int, shape (p, m), or None
+        Numbers with signs; None if no tip gives certain ones.
+    """
+    rng, size = np.random.default_rng(policy.seed), float(np.ptp(points, axis=0).max())
+    a, b = points[pairs[:, 0]], points[pairs[:, 1]]
+    long = np.flatnonzero((a != b).any(1))
+    for _ in range(policy.max_tips):
+        tip = points.mean(0) + size * rng.uniform(-0.5, 0.5, 3)
+        crossed = _crossings(a[long], b[long], tip, cores.points, cores.edges)
+        if crossed is not None:
+            counts = np.zeros((len(pairs), len(cores.edges)), dtype=np.int64)
+            np.add.at(counts, (long[crossed[1]], crossed[0]), crossed[2])
+            return counts
+    return None
+
+
+def costliest_loop(cores: Cores, pierced: Ints, costs: Floats) -> tuple[Ints, float] | None:
+    """Return a loop that a closed path winds around, and what it costs to unwind the path.
+
+    Parameters
+    ----------
+    cores : Cores
+        The cores.
+    pierced : ndarray of int, shape (m,)
+        How often each core pierces a surface within the path.
+    costs : ndarray of shape (m,)
+        Cost of leading the path over each core.
+
+    Returns
+    -------
+    (ndarray of int of shape (m,), float) or None
+        How often the loop runs along each core, with signs, and the least cost of a core of the
+        loop. No loop that the path winds around has a greater one. None if there is no such loop.
+    """
+    parent = list(range(len(cores.points)))
+    height = [0] * len(parent)
+    tree: dict[int, list[tuple[int, int, int]]] = {}
+
+    def root(node: int) -> tuple[int, int]:
+        total = 0
+        while parent[node] != node:
+            total += height[node]
+            node = parent[node]
+        return node, total
+
+    for e in np.argsort(-costs, kind="stable").tolist():
+        a, b = (int(x) for x in cores.edges[e])
+        (root_a, to_a), (root_b, to_b) = root(a), root(b)
+        # a potential that rises by the piercings along each core exists unless some loop has any
+        if root_a != root_b:
+            parent[root_b], height[root_b] = root_a, to_a + int(pierced[e]) - to_b
+            tree.setdefault(a, []).append((b, e, 1))
+            tree.setdefault(b, []).append((a, e, -1))
+        elif to_b - to_a != pierced[e]:
+            loop = np.zeros(len(cores.edges), dtype=np.int64)
+            loop[e] = 1
+            for along, sign in _tree_path(tree, b, a):
+                loop[along] = sign
+            return loop, float(costs[e])
+    return None
+
+
+def _tree_path(
+    tree: dict[int, list[tuple[int, int, int]]], begin: int, end: int
+) -> list[tuple[int, int]]:
+    """Return the cores of the path between two nodes of a tree, each with its direction."""
+    came: dict[int, tuple[int, int, int] | None] = {begin: None}
+    stack = [begin]
+    while end not in came:
+        node = stack.pop()
+        for other, edge, sign in tree.get(node, []):
+            if other not in came:
+                came[other] = node, edge, sign
+                stack.append(other)
+    out, step = [], came[end]
+    while step is not None:
+        node, edge, sign = step
+        out.append((edge, sign))
+        step = came[node]
     return out
