@@ -52,12 +52,14 @@ class ClearanceLegs:
     Examples
     --------
     >>> from netsp import Problem, travel_graph
-    >>> problem = Problem.load("problems/pool.json")
-    >>> wider = problem.model_copy(update={"clearance": problem.clearance + 0.05})
-    >>> legs = ClearanceLegs(travel_graph(problem), wider)
-    >>> before = legs.costs[0, 1]
-    >>> legs.raise_along([0, 1]), bool(legs.costs[0, 1] > before)
-    (True, True)
+    >>> from netsp.plan.space.clearance_legs import ClearanceLegs
+    >>> post = {"center": (2, 0), "radius": 0.5}
+    >>> problem = Problem(base=(0, 0), goals=[(4, 0)], obstacles=[post], tether_length=6)
+    >>> legs = ClearanceLegs(travel_graph(problem), problem.model_copy(update={"clearance": 0.1}))
+    >>> before = float(legs.costs[0, 1])
+    >>> grown = legs.raise_along([0, 1])
+    >>> grown, round(before, 3), round(float(legs.costs[0, 1]), 3)
+    (True, 4.126, 4.181)
     """
 
     def __init__(

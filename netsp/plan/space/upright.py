@@ -20,7 +20,6 @@ from netsp.model.problem import Circle, Polygon, Problem
 from netsp.plan.solve_problem import solve, solve_graph
 from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
-from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import (
     CLEARANCE_TOLERANCE,
@@ -83,12 +82,7 @@ def bound_by_upright_solids(
         return None  # no bound in the plane, so none in space
     if bound is None or bound.scope is not Scope.ALL_TOURS:
         return None
-    with_room = None
-    if not clock.is_up:
-        points = np.vstack([problem.points, mission.start])
-        room = min(mission.clearance, float(context.field.distance(points).min()))
-        growth = dip + judged_room(room, mission.delta)
-        with_room = _bound_with_room(problem, growth, context.policy, clock)
+    with_room = None if clock.is_up else _bound_with_room(problem, context, dip, clock)
     return max(bound.length, with_room or 0.0) * (1.0 - BOUND_ROUNDING)
 
 
@@ -103,24 +97,24 @@ def judged_room(room: float, delta: float) -> float:
 
 
 def _bound_with_room(
-    problem: Problem, growth: float, policy: MissionPolicy, clock: Clock
+    problem: Problem, context: PlanningContext, dip: float, clock: Clock
 ) -> float | None:
-    """Return a lower bound on all tours of a problem whose robot keeps `growth` from the obstacles;
-    None if there are too many classes for it.
+    """Return a lower bound on all tours of a problem whose robot keeps its clearance, where the
+    obstacles are shrunk by `dip`; None if there are too many classes for it.
 
     Solve for the shortest tour, measure its legs with the clearance, and solve again, until the
     legs of the shortest tour are measured or the time is up.
     """
+    mission, max_classes = context.mission, context.policy.bound.max_classes
+    points = np.vstack([problem.points, mission.start])
+    room = min(mission.clearance, float(context.field.distance(points).min()))
+    growth = max(0.0, dip + judged_room(room, mission.delta))
+    robot_problem = problem.model_copy(update={"clearance": growth})
     try:
-        roadmap = TautRoadmap(
-            problem, max_classes=policy.bound.max_classes, time_limit=clock.part(0.5)
-        )
+        roadmap = TautRoadmap(problem, max_classes=max_classes, time_limit=clock.part(0.5))
         if not roadmap.complete:
             return None
-        graph, robot_problem = (
-            roadmap.to_travel_graph(),
-            problem.model_copy(update={"clearance": growth}),
-        )
+        graph = roadmap.to_travel_graph()
         legs, best = ClearanceLegs(graph, robot_problem, clock=clock), 0.0
         if graph.legs_left_out:
             return None  # longer paths stand for them, which bound nothing
