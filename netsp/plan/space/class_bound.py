@@ -4,7 +4,7 @@ A tour must come home with its path unwound from every loop of the scene's bars 
 winding numbers at the waypoints, modulo three, are states of a travel graph. A leg that does not
 wind like the straight segment between its ends must go around a bar, and is longer
 (`netsp.plan.space.core_detours`). A state whose tether would be longer than the limit is left out.
-The shortest tour of this graph bounds all tours. The proof is in docs/theory, Section 24.
+The shortest tour of this graph bounds all tours. The proof is in docs/theory, Section 23.
 """
 
 from __future__ import annotations

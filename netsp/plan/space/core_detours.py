@@ -1,7 +1,7 @@
 """Lower bounds on paths that are not of the class of the straight segment between their ends.
 
 If a path cannot be deformed into the straight segment ab, then some point p of a core lies between
-a point q of the path and the point of ab that is closest to q (docs/theory, Proposition 34). The
+a point q of the path and the point of ab that is closest to q (docs/theory, Proposition 33). The
 path stays away from the core, so q lies beyond p by at least that distance, and the path is at
 least |aq| + |qb| long. The kernels bound the least such length over all p of a segment from below.
 """

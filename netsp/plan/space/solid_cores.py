@@ -1,7 +1,7 @@
 """Cores of solids: straight segments deep inside of them, joined where solids overlap.
 
 A path or tether that enters solids by less than a given depth stays away from all cores, and loops
-of cores are what tethers wind around (docs/theory, Section 24).
+of cores are what tethers wind around (docs/theory, Section 23).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Each loop of the cores (`netsp.plan.space.solid_cores`) is spanned by a cone of 
 number of times that a path crosses the cone, with signs, changes only by what the path winds around
 the loop: closed paths that can be deformed into one another have the same number. So these numbers
 are a homomorphism of the homotopy classes, and a class whose number is not zero is not contractible
-(docs/theory, Section 24).
+(docs/theory, Section 23).
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ that tether exceeds it; the reason states which, and by how much.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -479,9 +480,10 @@ class PredictivePlanner(Planner):
         return True
 
     def _leg_home(self, robot: Floats, tether: Tether) -> Floats | None:
-        """Return the tour's path home, if the tether fits on it and comes free."""
+        """Return the tour's path home, if it leads to the start of this mission, and the tether
+        fits on it and comes free."""
         leg = self._leg(robot, tether)
-        if leg is None:
+        if leg is None or math.dist(leg[-1], self.mission.start) > self.mission.reach:
             return None
         far, end = self._preview.follow(tether, leg, self.limit, 0.0)
         return leg if np.isinf(far) and self._is_free(end) else None
