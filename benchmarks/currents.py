@@ -46,14 +46,14 @@ HELD_OUT = 2
 """Number of random scenes of each kind."""
 
 SCENES = (ROOT / "tests" / "data", ROOT.parent / "shared" / "data" / "scenes")
-"""Folders of scenes by other hands; the second one may be absent."""
+"""Folders of scenes made by others; the second one may be absent."""
 
 Flight = tuple[str, float, int]
 """Name of the mission, speed, and index of the current."""
 
 
 def boulders(rng: np.random.Generator) -> sites.Site:
-    """A floor with 24 boulders of 0.3 to 1.2 m; waypoints close above and between them."""
+    """Return a floor with 24 boulders of 0.3 to 1.2 m; waypoints close above and between them."""
     solids: list[dict[str, Any]] = [sites.box((0, 0, -6.25), (16, 16, 0.5))]
     centers = np.column_stack([rng.uniform(-6, 6, (24, 2)), rng.uniform(-6.2, -5.4, 24)])
     for center, radius in zip(centers, rng.uniform(0.3, 1.2, 24), strict=True):
@@ -63,7 +63,7 @@ def boulders(rng: np.random.Generator) -> sites.Site:
 
 
 def plates(rng: np.random.Generator) -> sites.Site:
-    """Plates in a row, 1.1 to 1.6 m apart, of random heights; a waypoint low beside each."""
+    """Return plates in a row, 1.1 to 1.6 m apart, of random heights; a waypoint low beside each."""
     x = np.cumsum(rng.uniform(1.1, 1.6, 6))
     heights = rng.uniform(2.0, 4.5, 6)
     solids = [sites.box((a, 0, -6 + 0.5 * h), (0.2, 6, h)) for a, h in zip(x, heights, strict=True)]
@@ -72,7 +72,7 @@ def plates(rng: np.random.Generator) -> sites.Site:
 
 
 def leaning_poles(rng: np.random.Generator) -> sites.Site:
-    """Twelve poles that lean any way, with waypoints between them."""
+    """Return twelve poles that lean any way, with waypoints between them."""
     feet = rng.uniform(-5, 5, (12, 2))
     heads = feet + rng.uniform(-2, 2, feet.shape)
     solids = [sites.capsule((*f, -7), (*h, 0), 0.25) for f, h in zip(feet, heads, strict=True)]
@@ -84,7 +84,7 @@ KINDS = {"boulders": boulders, "plates": plates, "poles": leaning_poles}
 
 
 def mission_of(name: str) -> tuple[Mission, Scene]:
-    """The mission of a name in `names`, and its scene."""
+    """Return the mission of a name in `names`, and its scene."""
     kind, _, number = name.rpartition(" ")
     if kind in KINDS:
         return sites.tight_mission(name, *KINDS[kind](np.random.default_rng(int(number))))
@@ -100,7 +100,7 @@ def mission_of(name: str) -> tuple[Mission, Scene]:
 
 
 def names() -> list[str]:
-    """Names of all missions: our sites, shipped ones, those by other hands, and random ones."""
+    """Return the names of all missions: our sites, shipped, by others, and random ones."""
     held_out = [f"{kind} {seed}" for seed in range(HELD_OUT) for kind in (*KINDS, "frame")]
     others = dict.fromkeys(file.stem for file in _others())
     return [*sites.SITES, "basin", "pipes", "jacket", *others, *held_out]
@@ -111,7 +111,7 @@ def _others() -> list[Path]:
 
 
 def flights(name: str, waypoints: int, number: int) -> Iterator[Flight]:
-    """The flights of the mission of a number."""
+    """Yield the flights of a mission; its number chooses the currents of a long one."""
     for k, speed in enumerate(SPEEDS):
         if waypoints <= MAX_SHORT:
             for n in range(len(CURRENTS)):
@@ -121,7 +121,7 @@ def flights(name: str, waypoints: int, number: int) -> Iterator[Flight]:
 
 
 def flown(mission: Mission, scene: Scene, speed: float, current: int) -> dict[str, Any]:
-    """What one flight is judged by."""
+    """Fly a mission, and return the numbers by which the flight is judged."""
     begin = time.process_time()
     field = scene.field()
     changes = {"speed": speed, "current": CURRENTS[current]}
@@ -140,7 +140,7 @@ def flown(mission: Mission, scene: Scene, speed: float, current: int) -> dict[st
 
 
 def is_good(flight: dict[str, Any]) -> bool:
-    """All visited, home, free, and never over the limit."""
+    """Return whether a flight visited all, came home free, and was never over the limit."""
     complete = flight["visited"] == flight["waypoints"] and flight["home"] and flight["free"]
     return bool(complete and flight["over_s"] == 0.0)
 
@@ -175,7 +175,7 @@ def _show_row(name: str, group: list[dict[str, Any]], wanted: int) -> None:
 
 
 def main() -> None:
-    """Fly what is asked for and has not been flown yet, and print the table."""
+    """Fly the missions asked for that have not been flown yet, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--missions", nargs="*", default=names(), help="only these")
     parser.add_argument("--flights", type=Path, help="file of the flights so far, JSON lines")

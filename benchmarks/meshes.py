@@ -3,8 +3,8 @@ flown, beside an independent ray caster (`ray_caster.py`).
 
     python benchmarks/meshes.py FOLDER [--only NAME …] [--limit 5] [--record FILE] [--keep]
 
-FOLDER holds the files of `MESHES` (docs/notebook/space.md names their sources); those that are
-absent are left out. With `--record`, an interrupted run goes on where it was.
+FOLDER holds the files of `MESHES`; absent files are left out. With `--record`, an interrupted run
+goes on where it was.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ MESHES = (
 """Names of the files. Further ones in the folder are left out."""
 
 VARIANTS = {"spot.obj": "inverted", "homer.obj": "half of the faces turned", "rabbit.obj": "soup"}
-"""Defects that are made in sound meshes, because no file has them: each is measured besides."""
+"""Defects that are made in sound meshes, because no file has them. Such a mesh is a further row."""
 
 
 @dataclass
 class Outcome:
-    """Of one mesh. Areas in square metres, shares in per cent, seconds of CPU."""
+    """Results of one mesh: areas in square metres, shares in per cent, times in CPU seconds."""
 
     faces: int = 0
     notes: str = ""
@@ -76,7 +76,7 @@ class Outcome:
 
 
 def spoiled(triangles: Any, how: str) -> Any:
-    """Triangles with a defect."""
+    """Return triangles with a defect."""
     rng = np.random.default_rng(0)
     out = triangles.copy()
     if how == "inverted":
@@ -89,7 +89,8 @@ def spoiled(triangles: Any, how: str) -> Any:
 
 
 def measured(path: Path, how: str, limit: float, record: Path | None) -> Outcome:
-    """One mesh: covered, solved, flown, and the same by rays; from the record if it is there."""
+    """Cover, solve and fly one mesh, and count by rays; read the results from the record if it has
+    them."""
     lines = record.read_text().splitlines() if record is not None and record.exists() else []
     known = {(k["name"], k["how"]): k["outcome"] for k in map(json.loads, lines)}
     if (path.name, how) in known:
@@ -163,7 +164,7 @@ def _fly(path: Path, triangles: Any, limit: float, out: Outcome) -> None:
 
 
 def main() -> None:
-    """Run what was asked for."""
+    """Measure the meshes asked for, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*")

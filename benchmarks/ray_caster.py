@@ -51,7 +51,7 @@ class RayCaster:
         self.seen = np.zeros(len(self.places), dtype=bool)
 
     def lengths(self, starts: Any, ahead: Any) -> tuple[Any, Any]:
-        """Distances to the first hit, inf without one, and the faces hit."""
+        """Return the distances to the first hit, infinite without one, and the faces hit."""
         found = self.scene.run(
             np.ascontiguousarray(starts, dtype=np.float32),
             np.ascontiguousarray(ahead, dtype=np.float32),
@@ -61,7 +61,7 @@ class RayCaster:
         return far, found["primID"]
 
     def escaping(self, places: Any, normals: Any) -> Any:
-        """Share of random paths from each side that leave the mesh."""
+        """Return the share of random paths from each side that leave the mesh."""
         owner = np.repeat(np.arange(len(places)), WALKS)
         at, normal = places[owner], normals[owner]
         out = np.zeros(len(places))
@@ -110,5 +110,5 @@ class RayCaster:
 
     @property
     def share(self) -> float:
-        """Share of the outsides that has been seen."""
+        """Return the share of the outsides that has been seen."""
         return float(self.seen.mean()) if len(self.seen) else 0.0

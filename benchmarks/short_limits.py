@@ -33,7 +33,7 @@ SAMPLES_S = (2.0, 5.0, 10.0, 30.0, 60.0)
 """Seconds at which the incumbent of one run is looked at."""
 
 OTHERS = ROOT.parent / "shared" / "data" / "scenes"
-"""Scenes by other hands, where they are present."""
+"""Folder of scenes made by others; it may be absent."""
 
 
 def _other(name: str) -> tuple[Mission, Scene]:
@@ -42,7 +42,7 @@ def _other(name: str) -> tuple[Mission, Scene]:
 
 
 def scenes() -> dict[str, Callable[[], tuple[Mission, Scene]]]:
-    """Return 24 scenes: our sites, shipped missions, scenes by other hands, frames and prisms."""
+    """Return 24 scenes: our sites, shipped missions, scenes made by others, frames and prisms."""
     made: dict[str, Callable[[], tuple[Mission, Scene]]] = {}
     for name in SITES:
         made[name] = lambda name=name: mission_of(name)

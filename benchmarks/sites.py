@@ -190,7 +190,7 @@ def mission_of(name: str) -> tuple[Mission, Scene]:
 
 
 def tight_mission(name, solids, bounds, points, anchor) -> tuple[Mission, Scene]:
-    """A mission at a site, with a tether that only just reaches, and the scene."""
+    """Return a mission at a site, with a tether that only just reaches, and the scene."""
     scene = Scene(name=name, solids=solids, bounds=bounds)
     field = scene.field()
     places = pushed_out(field, points, 0.4)

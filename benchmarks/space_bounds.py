@@ -37,7 +37,7 @@ def scene_named(name: str) -> tuple[Mission, Scene]:
 
 
 def published_tour(name: str) -> float:
-    """Length of the tour in the tables of tours, m."""
+    """Return the length of the tour in the tables of tours, m."""
     is_frame = name.startswith("frame ")
     table = json.loads((RESULTS / f"space-{'frames' if is_frame else 'missions'}.json").read_text())
     wanted = name.split()[1] if is_frame else name
@@ -46,7 +46,7 @@ def published_tour(name: str) -> float:
 
 
 def bounds_of(name: str, seconds: float) -> tuple[float, float, int, float]:
-    """Both bounds, m, the number of loops that are counted, and CPU seconds."""
+    """Return both bounds, m, the number of loops that are counted, and CPU seconds."""
     mission, scene = scene_named(name)
     field = scene.field()
     context = PlanningContext.for_mission(mission, scene, field)

@@ -192,8 +192,8 @@ def _radius(a, b, c, x, y, z):
 
 @numba.njit(cache=True)
 def is_free(rows, corners, a, b, c, dip):
-    """Whether balls of free water, deeper by `dip` than the surfaces, cover a triangle, but for
-    pieces smaller than `GRAIN` whose centres are free."""
+    """Return whether balls of water, which may reach `dip` below the surfaces, cover a triangle. Of
+    pieces smaller than `GRAIN`, only the centres are tested."""
     x, y, z = (a[0] + b[0] + c[0]) / 3, (a[1] + b[1] + c[1]) / 3, (a[2] + b[2] + c[2]) / 3
     radius = _radius(a, b, c, x, y, z)
     near, close = np.empty(len(rows), dtype=np.int64), 0

@@ -186,7 +186,7 @@ def test_a_mission_is_written_that_can_be_solved(tmp_path, capsys):
     mission = Mission.load(out)
     assert mission.load_scene().name == "ring"
     assert all(w.heading is not None for w in mission.waypoints)
-    assert "shortest time" in said.err
+    assert "for a short time" in said.err
     few = tmp_path / "few.json"
     again = ["--fewest", "--speed", "0.4", "--share", "0.3", "-o", str(few), "--json"]
     assert main([*call, *again]) == 0

@@ -122,8 +122,8 @@ class Clock:
     def paced(self, planned_s: float) -> Clock:
         """Return a clock that plans with some seconds from now on, however much time is left.
 
-        Shares of it do not depend on the time limit. So work that divides its time by shares does
-        the same up to the limit, whatever the limit is, and more time never leads to other results.
+        Its shares do not depend on the time limit. So work that divides its time by shares takes
+        the same steps whatever the limit is, and a longer limit only adds steps.
 
         Parameters
         ----------
@@ -143,14 +143,14 @@ class Clock:
 
     @property
     def planned_left(self) -> float:
-        """Seconds that a paced clock plans with, and seconds left for others."""
+        """Seconds that a paced clock still plans with; for any other clock, the seconds left."""
         if self._pace is None or self.is_stopped:
             return self.left
         return self._planned_end - time.monotonic()
 
     @property
     def has_run_out(self) -> bool:
-        """State of a paced clock of which some part was up when it was looked at: its work may have
+        """Flag that a paced clock or one of its parts was found to be up, so that its work may have
         been cut short."""
         pace = self._pace
         return pace is not None and (pace.has_run_out or any(f[0] != 0 for f in pace.flags))
@@ -378,9 +378,9 @@ class _Pace:
     Attributes
     ----------
     has_run_out
-        Whether one of them was up when it was looked at.
+        Whether the clock or one of its parts was found to be up.
     flags
-        Flags of these clocks.
+        Flags by which these clocks are stopped.
     """
 
     has_run_out: bool = False

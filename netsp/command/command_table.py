@@ -217,7 +217,7 @@ COVER = Command(
     ),
     Option(
         "--fewest",
-        "choose the fewest waypoints; default: waypoints and tour with the shortest time",
+        "choose the fewest waypoints; default: waypoints and tour together, for a short time",
     ),
     Option("--speed V", "speed of the robot (m/s); default that of missions, 0.3", length),
     time_limit("seconds for the whole command", 60.0),

@@ -107,7 +107,7 @@ def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> 
     if count == found.bound:
         chosen = "the fewest: no choice among them has fewer"
     if found.objective == "time":
-        chosen = "chosen with their tour for the shortest time"
+        chosen = "chosen together with their tour, for a short time"
     lines = [
         f"seen      {100 * found.seen:.1f} % of the surface; from all {found.candidates} "
         f"candidates together {100 * found.visible:.1f} %",

@@ -61,7 +61,7 @@ class Cover(ComparesArrays):
     visible_patches : ndarray of bool, shape (m,)
         Whether each patch is seen from any of the candidates.
     objective : {"time", "viewpoints"}
-        What was made small: the time until the robot is home, or the number of viewpoints.
+        Quantity that was kept small: the time until the robot is home, or the number of viewpoints.
     tour_length : float
         Estimated length of the tour in the order of the waypoints, metres. The planner may find a
         shorter tour, or need a longer one for the tether.
@@ -138,7 +138,7 @@ def cover(
     inspect : tuple of str, optional
         Names of the solids to be seen; all but half spaces and the sea floor by default.
     objective : {"time", "viewpoints"}
-        What to make small: the time until the robot is home, with viewpoints and tour chosen
+        Quantity to keep small: the time until the robot is home, with viewpoints and tour chosen
         together, or the number of viewpoints.
     speed : float, optional
         Speed of the robot, m/s; by default that of missions.

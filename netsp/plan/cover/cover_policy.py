@@ -18,15 +18,15 @@ class TourSearchPolicy:
     max_rounds
         Maximum number of rounds.
     idle_rounds_per_visit
-        Number of rounds without a gain after which the search ends, as a multiple of the visits of
-        the tour and one more.
+        Number of rounds without a gain after which the search ends, for each place of the tour
+        (its visits and the start).
     min_gain
-        Smallest gain, as a share of the cost, that counts as one.
+        Smallest decrease of the cost, as a share of it, that counts as a gain.
     max_removed
         Maximum number of viewpoints that a round removes.
     run_share, random_share
-        Shares of rounds that remove a run of the tour, and any viewpoints. The others remove the
-        viewpoints nearest to one of them.
+        Shares of rounds that remove a run of the tour, and random viewpoints. The other rounds
+        remove the viewpoints nearest to one of them.
     min_gain_exponent, max_gain_exponent
         Range of the exponent of the area that a viewpoint adds, which is weighed against its price.
     noise
@@ -112,7 +112,7 @@ class CoverPolicy:
     max_sight_lines
         Maximum number of straight legs between viewpoints that are checked for solids.
     samples_per_clearance
-        Points on such a leg per clearance, at which its distance from solids is tested.
+        Number of points per clearance at which the distance of such a leg from solids is tested.
     sparse_neighbours
         Number of neighbours of a viewpoint in the graph of detours round solids.
     turning_ratios

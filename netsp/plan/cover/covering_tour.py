@@ -5,7 +5,7 @@ through some viewpoints that see the needed area, so that the sum of legs and of
 viewpoints is least (Gendreau, Laporte & Semet 1997; Golden et al. 2012). The search is a large
 neighbourhood search (Shaw 1998): each round
 
-1. removes viewpoints: a run of the tour, the nearest to one of them, or any;
+1. removes viewpoints: a run of the tour, those nearest to one of them, or random ones;
 2. adds viewpoints until the needed area is seen again, each time the one with the largest gain of
    area for its price, which is that of its insertion into the tour and its own;
 3. drops viewpoints that are no longer needed, the one that saves most first;
@@ -244,8 +244,8 @@ class _Search:
 
 
 def _insertions(distances: Floats, candidates: Ints, tour: Ints) -> tuple[Floats, Ints]:
-    """Return what the insertion of each candidate into a tour adds to it, and the position in the
-    tour after which it adds least."""
+    """Return the least length that inserting each candidate adds to a tour, and the position in
+    the tour after which it adds so little."""
     legs = distances[tour, np.roll(tour, -1)]
     to_visits = distances[np.ix_(candidates, tour)]
     added = to_visits + np.roll(to_visits, -1, axis=1) - legs[None]
@@ -256,8 +256,8 @@ def _insertions(distances: Floats, candidates: Ints, tour: Ints) -> tuple[Floats
 def _update_insertions(
     distances: Floats, candidates: Ints, tour: Ints, at: int, insertion: Floats, after: Ints
 ) -> Ints:
-    """Update what insertions add, in place, after a visit was inserted after position `at`; return
-    the positions."""
+    """Update in place the lengths that insertions add, after a visit was inserted behind position
+    `at`; return the positions."""
     is_broken = after == at
     after = np.where(after > at, after + 1, after)
     if is_broken.any():

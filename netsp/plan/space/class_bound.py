@@ -59,12 +59,12 @@ def add_windings(a: int, b: int, n: int) -> int:
 
 
 class Detour(NamedTuple):
-    """Bound on paths that wind in some way, and the bars that they are led over.
+    """Lower bound on paths with some windings, and the bars that the bound leads them around.
 
     Attributes
     ----------
     length
-        Bound on the paths, or on what they are longer than others, metres.
+        Lower bound on the length of the paths, or on their excess over other paths, metres.
     bars
         Segments of the cores, as pairs of number and direction.
     """
@@ -145,8 +145,8 @@ class WindingLegs:
         Returns
         -------
         bounds : dict of int to Detour
-            The bound by what the windings differ from those of the segment; `on_all`
-            for 0.
+            Bounds, by the difference of the windings from those of the segment; the bound for
+            difference 0 is `on_all`.
         others : float
             Bound on the paths with any other windings, metres.
         """
@@ -282,7 +282,7 @@ class WindingGraph:
         return found
 
     def leg(self, begin: tuple[int, int], end: tuple[int, int]) -> Detour | None:
-        """Return what a leg between two states is longer than others; None if it is too long."""
+        """Return the excess of a leg between two states over other legs; None if it is too long."""
         (u, w), (v, x) = begin, end
         turn = self.legs.sum(x, self.legs.negative(w), self.legs.negative(self.legs.straight(u, v)))
         return self._legs.get((u, v), {}).get(turn)

@@ -276,13 +276,13 @@ class ClassPolicy:
         Maximum number of states of a travel graph. More states allow a higher bound and take more
         time.
     max_leg_windings, max_tether_windings
-        Maximum number of windings of a leg, and of a tether; each bar that is near takes three
-        times as many.
+        Maximum number of windings of a leg, and of a tether. Each nearby bar triples the number of
+        windings to look at.
     tolerance
         Amount by which the bound on a detour may be less than it could be, metres; more than 0.
     max_segments
-        Number of segments of bars and rings from which on no loops are searched for, which would
-        take more than seconds.
+        Number of segments of bars and rings from which on no loops are searched for, because the
+        search would take too long.
     hub_samples
         Number of points of a bar at which its depth in a box or half-space is measured.
     max_tips
@@ -566,7 +566,7 @@ class MissionPolicy:
     ----------
     round_s
         Seconds that the first round of the search plans with; more than 0. Rounds do not depend on
-        the time limit, so that a longer limit never leads to a worse tour.
+        the time limit, so that a longer limit begins with the rounds of a shorter one.
     round_growth
         Ratio of the times that two successive rounds plan with; more than 1. With a larger ratio,
         less work is done again, and more of it is lost in the last round, which the limit ends.
@@ -586,7 +586,7 @@ class MissionPolicy:
         one, very large missions end later.
     given_order_s
         CPU seconds, at least 0, up to which `predictive` drives the order of the file, even if the
-        time limit is shorter. That order is there along spokes before.
+        time limit is shorter. Before that, netsp drives the same order along spokes.
     tether_share
         Share of the tether that states and legs may need. The rest is for how the robot is steered,
         and for the tether's length between two steps along a leg.

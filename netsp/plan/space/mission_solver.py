@@ -1,15 +1,14 @@
 """Plan a mission: order, legs, and a flight that proves them.
 
-The first tours need no words of the scene, so they are there within a second or two: the order of
+The first tours need no words of the scene, whose search takes long in large scenes: the order of
 the file along spokes (`netsp.plan.space.spoke_tours`) and by the planner `predictive`, then short
 orders along spokes and, among upright prisms, the tours of the plane (`netsp.plan.space.prisms`).
 If the shortest tour of the plane is proven, the search ends. Otherwise gaps and words are searched
 for, and then tours along states and legs (`netsp.plan.space.space_plan`), in rounds that each plan
-with a fixed time: a run with a longer limit begins with the rounds of a shorter one, so it is never
-worse. The first round also looks for a short order by `predictive`
-(`netsp.plan.space.short_orders`) and the order by going straight on
-(`netsp.plan.space.visit_order`). All tours go through `Incumbents`, which accepts none that the
-judge refuses.
+with a fixed time: a run with a longer limit begins with the rounds of a shorter one. The first
+round also looks for a short order by `predictive` (`netsp.plan.space.short_orders`) and the order
+by going straight on (`netsp.plan.space.visit_order`). All tours go through
+`Incumbents`, which accepts none that the judge refuses.
 """
 
 from __future__ import annotations

@@ -56,8 +56,8 @@ class TetherPhysics(Model):
     friction: Annotated[
         Annotated[NonNegative, Field(le=10.0)],
         Field(
-            description="coefficient of friction at contacts; above 0, lengths of the tether are "
-            "those if friction holds it on the ends of solids"
+            description="coefficient of friction at contacts; above 0, planners and limits count "
+            "the tether's length if friction holds it on the ends of solids"
         ),
     ] = 0.0
     max_tension_ratio: Annotated[

@@ -1,6 +1,6 @@
 """Body of a mesh: the faces that bound a solid, and the sheets, which have water on both sides.
 
-Meshes as people have them are open, inside out, or soups of faces. Closed parts bound solids. An
+Many meshes are open, inside out, or soups of faces. Closed parts bound solids. An
 open part does, too, if its winding number just behind its faces is nearly 1: its holes are small,
 and flat fans close them. All other faces are sheets.
 """
@@ -94,7 +94,7 @@ def body_of_mesh(
 
 
 class _Builder:
-    """Builder of a body from faces of the file's vertices and the same of welded ones."""
+    """Builder of a body from faces, by the vertices of the file and by welded vertices."""
 
     def __init__(
         self,

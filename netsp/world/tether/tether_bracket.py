@@ -1,8 +1,8 @@
 """Bracket of a hanging tether: the lengths that it has at least and at most.
 
 Where a tether may slip off the end of a body, its class has several locally shortest curves. The
-taut tether leaves one for another at the place where the first ceases to exist. A cable leaves it
-earlier, because something shakes it, or later, because friction holds it. A taut tether never
+taut tether leaves one for another where the first ceases to exist. A cable may leave it earlier,
+because something shakes it, or later, because friction holds it. A taut tether never
 becomes shorter by more than its ends travel, except when it slips (docs/theory/tether). So each
 larger fall is a slip, and the two ends of the bracket differ from the taut length only near slips:
 
@@ -40,7 +40,7 @@ class BracketPolicy:
     ----------
     hold_friction
         Largest coefficient of friction between the cable and what it hangs on. A cable with less
-        friction slips no later than the one that is assumed to hold.
+        friction is assumed to slip no later.
     min_slip_share
         Share of the length by which a tether must become shorter than its ends explain to count as
         slipping, and by which two tethers differ at least. The default is half of what reports
@@ -274,7 +274,7 @@ class HoldingTether(GeodesicTether):
         Parameters
         ----------
         tether : Tether
-            Tether where the path begins; what may hold it is left out.
+            Tether where the path begins; its held tethers are left out.
         path : array_like, shape (k, 3)
             Points that the robot passes, metres, at steps that are fine beside delta.
         stops : sequence of int, optional
