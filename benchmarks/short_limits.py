@@ -93,8 +93,8 @@ def first_tour(name: str, make: Callable[[], tuple[Mission, Scene]], with_words:
 def trajectory(
     mission: Mission, scene: Scene, limit: float
 ) -> tuple[SolvedMission, list[tuple[float, int, float]], float]:
-    """Return the result of a run, its incumbents with the seconds after which each came, and all
-    seconds."""
+    """Return the result of a run, its incumbents with the seconds after which each came, and the
+    seconds of the whole run."""
     rows: list[tuple[float, int, float]] = []
     begin = time.monotonic()
 

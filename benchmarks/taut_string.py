@@ -101,7 +101,7 @@ def packed(solids: Sequence) -> tuple[np.ndarray, np.ndarray]:
 
 @numba.njit(cache=True)
 def _gap(row, corners, x, y, z):
-    """Signed distance of a point from the surface of one solid."""
+    """Return the signed distance of a point from the surface of one solid."""
     kind = int(row[0])
     if kind == POST:
         return math.hypot(x - row[1], y - row[2]) - row[3]
@@ -160,7 +160,7 @@ def _gap(row, corners, x, y, z):
 
 @numba.njit(cache=True)
 def _room(rows, corners, x, y, z):
-    """Distance of a point from the nearest solid, negative inside."""
+    """Return the distance of a point from the nearest solid, negative inside."""
     best = math.inf
     for n in range(len(rows)):
         best = min(best, _gap(rows[n], corners, x, y, z))
@@ -169,7 +169,7 @@ def _room(rows, corners, x, y, z):
 
 @numba.njit(cache=True)
 def rooms(rows, corners, points):
-    """Distances of points (n, 3) from the nearest solid, negative inside."""
+    """Return the distances of points (n, 3) from the nearest solid, negative inside."""
     out = np.empty(len(points))
     for n in range(len(points)):
         out[n] = _room(rows, corners, points[n, 0], points[n, 1], points[n, 2])
@@ -183,7 +183,7 @@ def _distance(a, b):
 
 @numba.njit(cache=True)
 def _radius(a, b, c, x, y, z):
-    """Largest distance of the corners of a triangle from a point."""
+    """Return the largest distance of the corners of a triangle from a point."""
     best = 0.0
     for v in (a, b, c):
         best = max(best, math.sqrt((v[0] - x) ** 2 + (v[1] - y) ** 2 + (v[2] - z) ** 2))
@@ -236,7 +236,7 @@ def is_free(rows, corners, a, b, c, dip):
 
 @numba.njit(cache=True)
 def _gradient(rows, corners, p):
-    """Gradient of the distance at a point, by differences."""
+    """Return the gradient of the distance at a point, by differences."""
     g, h = np.empty(3), 1e-6
     for k in range(3):
         q = p.copy()

@@ -38,7 +38,7 @@ def bracket_run(
         `hold_friction`, the `longest` length that the tether has at most, metres, and the next
         `waypoint` there; `over_s`, the time over the limit if friction holds the tether; and in
         `stops` the lengths `at_least` and `at_most` at the waypoints where they differ by more than
-        a hundredth of the taut length `tether`. None if anchor or scene have changed.
+        a hundredth of the taut length `tether`. None if the anchor moved or the scene changed.
 
     Raises
     ------
