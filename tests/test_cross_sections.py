@@ -2,6 +2,7 @@
 stand through it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -142,3 +143,17 @@ def test_a_box_counts_beside_solids_that_do_not_stand_upright_only_if_no_tether_
     assert upright_obstacles(water(tall, LOW, tether_length=12.0), 0.015) == []
     # and without bounds the cells of the grid go over it
     assert upright_obstacles(water(BOX, bounds=None), 0.015) == []
+
+
+def test_a_thin_post_with_many_classes_does_not_weaken_the_bound_around_a_wall():
+    """The robot's clearance is in the bound only if all classes fit into the list."""
+    wall = {"prism": {"polygon": [[-0.5, -3], [0.5, -3], [0.5, 3], [-0.5, 3]]}}
+    rope = {"post": {"center": [-2.5, 2.5], "radius": 0.05}}
+
+    def bound_of_few_classes(*solids) -> float:
+        made = water(*solids, clearance=0.4)
+        few = replace(made.policy, bound=replace(made.policy.bound, max_classes=8))
+        return bound(replace(made, policy=few))
+
+    assert bound_of_few_classes(wall, rope) >= bound_of_few_classes(wall) * (1.0 - 1e-6)
+    assert bound_of_few_classes(wall) > bound(water(wall, clearance=0.1))

@@ -10,6 +10,8 @@ which solids stand through all depths, is in docs/theory, Section 22.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from netsp.base.clock import Clock
@@ -105,16 +107,16 @@ def _bound_with_room(
     Solve for the shortest tour, measure its legs with the clearance, and solve again, until the
     legs of the shortest tour are measured or the time is up.
     """
-    mission, max_classes = context.mission, context.policy.bound.max_classes
+    mission = context.mission
     points = np.vstack([problem.points, mission.start])
     room = min(mission.clearance, float(context.field.distance(points).min()))
     growth = max(0.0, dip + judged_room(room, mission.delta))
-    robot_problem = problem.model_copy(update={"clearance": growth})
     try:
-        roadmap = TautRoadmap(problem, max_classes=max_classes, time_limit=clock.part(0.5))
-        if not roadmap.complete:
+        roadmap = _complete_roadmap(problem, context.policy.bound.max_classes, clock)
+        if roadmap is None:
             return None
         graph = roadmap.to_travel_graph()
+        robot_problem = roadmap.problem.model_copy(update={"clearance": growth})
         legs, best = ClearanceLegs(graph, robot_problem, clock=clock), 0.0
         if graph.legs_left_out:
             return None  # longer paths stand for them, which bound nothing
@@ -126,6 +128,29 @@ def _bound_with_room(
                 return best
     except NetspError:
         return None
+
+
+def _complete_roadmap(problem: Problem, max_classes: int, clock: Clock) -> TautRoadmap | None:
+    """Return a roadmap with all classes; if there are too many, without the thinnest obstacles.
+
+    A tether can be wound often around a thin post, which makes many classes that no short tour
+    needs. A problem with fewer obstacles has no longer tours, so its bound holds.
+    """
+    obstacles = sorted(problem.obstacles, key=_girth, reverse=True)
+    while obstacles and not clock.is_up:
+        reduced = problem.model_copy(update={"obstacles": tuple(obstacles)})
+        roadmap = TautRoadmap(reduced, max_classes=max_classes, time_limit=clock.part(0.5))
+        if roadmap.complete:
+            return roadmap
+        obstacles.pop()
+    return None
+
+
+def _girth(obstacle: Circle | Polygon) -> float:
+    """Return the perimeter of an obstacle, metres."""
+    if isinstance(obstacle, Circle):
+        return 2.0 * math.pi * obstacle.radius
+    return float(obstacle.shape(0.0).length)
 
 
 def upright_obstacles(context: PlanningContext, dip: float) -> list[Circle | Polygon]:
