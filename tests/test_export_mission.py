@@ -64,6 +64,20 @@ def test_the_waypoints_are_those_of_the_tour(file, tmp_path):
     assert np.abs(np.array(back) - line[:, :2]).max() < 1e-3
 
 
+def test_a_place_may_be_visited_twice_with_other_headings(file, tmp_path):
+    mission, out = Mission.load(file), tmp_path / "m.csv"
+    last, tour = mission.waypoints[-1], mission.tour
+    again = tour.stops[-1].model_copy(update={"path": (tour.stops[-1].path[-1],) * 2})
+    twice = mission.model_copy(update={
+        "waypoints": (*mission.waypoints, last.model_copy(update={"heading": 10.0})),
+        "tour": tour.model_copy(update={"stops": (*tour.stops, again)}),
+    })  # fmt: skip
+    export_mission(twice, out, "csv", ORIGIN)
+    goals = [r for r in csv.DictReader(out.read_text().splitlines()) if r["kind"] == "goal"]
+    assert [int(r["goal"]) for r in goals] == [0, 1, 2, 3, 4]
+    assert [goals[3][a] for a in "xyz"] == [goals[4][a] for a in "xyz"]
+
+
 def test_depths_are_below_the_surface_and_headings_of_the_compass(file, tmp_path):
     mission, out = Mission.load(file), tmp_path / "m.plan"
     export_mission(mission, out, "plan", ORIGIN, surface=0.5)

@@ -237,11 +237,18 @@ def _sunk(p: Waypoint, surface: float) -> Waypoint:
 
 
 def _problem_of_mission(mission: Mission, surface: float) -> Problem:
-    """Return a problem with the mission's places, from which formats take names and the base."""
+    """Return a problem with the mission's places, from which formats take names and the base.
+
+    Goals of a problem are distinct, and a mission may visit a place again with another heading. So
+    the goal of a later visit lies higher by a millionth of the tether for each earlier one.
+    """
     x, y, z = mission.start
+    places, step = mission.places.tolist(), 1e-6 * mission.tether_length
     goals = tuple(
-        Goal(position=(a, b, c - surface), name=f"waypoint {k}")
-        for k, (a, b, c) in enumerate(mission.places.tolist())
+        Goal(
+            position=(a, b, c - surface + step * places[:k].count([a, b, c])), name=f"waypoint {k}"
+        )
+        for k, (a, b, c) in enumerate(places)
     )
     return Problem(
         name=mission.name,
