@@ -445,6 +445,10 @@ SIMULATE = Command(
     ),
     Option("--snap", "move waypoints out of solids"),
     Option(
+        "--bracket",
+        "also estimate how short and how long the tether may be where friction lets it hang",
+    ),
+    Option(
         "-o, --output RUN", "folder for log.csv, summary.json, run.png and (with plotly) run.html"
     ),
     QUIET,

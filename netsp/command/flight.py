@@ -123,7 +123,7 @@ def _flown(
                 from netsp.plan.space.flown import words_of_flight
 
                 run.summary["words"] = words_of_flight(run, scene=scene, field=field).to_summary()
-            if run.summary["status"] == "done":
+            if getattr(args, "bracket", False) and run.summary["status"] == "done":
                 from netsp.plan.space.run_bracket import bracket_run
 
                 run.summary["bracket"] = clock.bounded(

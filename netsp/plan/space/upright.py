@@ -133,7 +133,7 @@ def _bound_with_room(
 def _complete_roadmap(problem: Problem, max_classes: int, clock: Clock) -> TautRoadmap | None:
     """Return a roadmap with all classes; if there are too many, without the thinnest obstacles.
 
-    A tether can be wound often around a thin post, which makes many classes that no short tour
+    A tether can wind often around a thin post, which makes many classes that no short tour
     needs. A problem with fewer obstacles has no longer tours, so its bound holds.
     """
     obstacles = sorted(problem.obstacles, key=_girth, reverse=True)
