@@ -49,11 +49,15 @@ class JudgePolicy:
         resolutions (docs/theory/tether.md).
     tether_share
         Share of the tether within which a waypoint must not be left out.
+    max_cell_halvings
+        How often cells are halved for a tour that states no words and whose word at the end is not
+        empty, because coarse cells may close a passage; at least 1.
     """
 
     delta_ratio: float = 0.5
     max_length_error: float = 0.01
     tether_share: float = 0.99
+    max_cell_halvings: int = 2
 
     def __post_init__(self) -> None:
         check_positive(self)
@@ -98,14 +102,41 @@ def verify_mission(
     if mission.track:
         raise InputError("track: a tour is for a fixed anchor; expected a mission without")
     check_size(mission)
-    if context is None:
-        scene = scene or mission.load_scene()
-        check_bounds(mission, scene)
-        context = PlanningContext.for_mission(mission, scene, field or scene.field())
     policy = policy or JudgePolicy()
+    if context is not None:
+        return _judged(mission, context, policy)
+    scene = scene or mission.load_scene()
+    check_bounds(mission, scene)
+    field = field or scene.field()
+    context = PlanningContext.for_mission(mission, scene, field)
+    found = _judged(mission, context, policy)
+    for _ in range(policy.max_cell_halvings):
+        if not _lacks_only_an_empty_word(found, mission.tour):
+            break
+        # a coarse grid may close a passage, and an empty word on any grid proves that the tether
+        # comes free (docs/theory/space.md, P1)
+        smaller = mission.model_copy(update={"cell": 0.5 * context.grid.cell})
+        try:
+            context = PlanningContext.for_mission(smaller, scene, field)
+        except InputError:
+            break  # too many cells
+        found = _judged(mission, context, policy)
+    return found
+
+
+def _judged(mission: Mission, context: PlanningContext, policy: JudgePolicy) -> Verification:
+    """Judge a planned mission with the words of a context."""
+    assert mission.tour is not None
     finer = mission_tether(mission, context.field, policy.delta_ratio)
     context = replace(context, mission=mission, model=finer)
     return Verification(tuple(_Judge(mission, mission.tour, context, policy).run()))
+
+
+def _lacks_only_an_empty_word(found: Verification, tour: PlannedTour) -> bool:
+    """Return whether a tour that states no words fails the check of its word at the end alone."""
+    failed = [check.name for check in found.checks if not check.passed]
+    is_unstated = all(stop.signature is None for stop in tour.stops)
+    return is_unstated and failed == ["empty word at the end"]
 
 
 def check_mission_tour(mission: Mission, scene: Scene, field: DistanceField) -> None:
