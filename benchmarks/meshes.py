@@ -151,7 +151,7 @@ def _fly(path: Path, triangles: Any, limit: float, out: Outcome) -> None:
     run = simulate(mission, scene=scene)
     out.simulate_s, out.flown = clock() - begin, 100 * run.summary["coverage"]
     out.visited = f"{run.summary['visited']} of {run.summary['waypoints']}"
-    rays = RayCaster(triangles)
+    rays = RayCaster(triangles, CAMERA, found.mission.clearance, COVER["incidence"])
     out.area_by_rays = rays.area
     for place, yaw in zip(found.viewpoints.places, found.viewpoints.headings, strict=True):
         rays.look(place, float(yaw), CAMERA, COVER["incidence"])
