@@ -79,8 +79,12 @@ def test_dividing_keeps_the_area_and_bounds_the_sides():
 
 
 def test_names_of_nothing_are_refused():
-    with pytest.raises(InputError, match="inspect: expected names of solids, got 'hull'"):
-        cover([BALL], Camera(), inspect=("hull",))
+    unnamed, keel = {"sphere": BALL["sphere"]}, {**BALL, "name": "keel"}
+    expected = "inspect: expected names of solids, got 'hull'; there are none with a name"
+    with pytest.raises(InputError, match=expected):
+        cover([unnamed], Camera(), inspect=("hull",))
+    with pytest.raises(InputError, match=r"got 'hull'; there are 'ball', 'keel'$"):
+        cover([BALL, unnamed, keel], Camera(), inspect=("hull",))
 
 
 def test_a_sheet_is_seen_from_either_side_and_its_patches_lie_on_it(tmp_path):

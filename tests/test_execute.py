@@ -231,7 +231,10 @@ def test_execute_writes_its_logs_and_pictures(tmp_path, capsys):
         ({"time": 1}, "expected one of appear"),
         ({"time": 1, "vanish": 0, "push": [0, 0, 0]}, "got vanish, push"),
         ({"time": 1, "vanish": 99}, r"events\[0\]: vanish: expected a number below 8, got 99"),
-        ({"time": 1, "vanish": "no such"}, "expected the name of one, got 'no such'"),
+        (
+            {"time": 1, "vanish": "no such"},
+            "expected the name of one, got 'no such', of which there are 0; there are '",
+        ),
         ({"time": 1, "cancel_goal": 99}, "cancel_goal: expected a number below 8"),
         ({"time": -1, "push": [0, 0, 0]}, r"events\[0\].*time"),
         ({"time": 1, "appear": {"center": [0, 0], "radius": 2}}, "would stand on the base"),

@@ -458,7 +458,7 @@ def test_a_structure_to_inspect_makes_its_goals():
     assert np.allclose(hull.signed_distance(xy[8:14]), 1.0, atol=1e-3)
     assert verify(problem, solve(problem))
     other = {**json.loads(problem.to_json()), "goals": [{"inspect": "B", "standoff": 1}]}
-    with pytest.raises(InputError, match=r"goals\[0\].inspect: expected the name of an obstacle"):
+    with pytest.raises(InputError, match=r"goals\[0\].inspect: .* got 'B'; there are 'A1'"):
         Problem.from_json(json.dumps(other))
 
 

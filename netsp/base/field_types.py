@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from netsp.base.errors import InputError
-from netsp.base.validated import shown
+from netsp.base.validated import shown, shown_names
 
 LARGEST = 1e12
 """Format limit of all files: magnitude of a coordinate, radius or length."""
@@ -62,7 +62,8 @@ def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore
         if not found and which in (f"#{k}" for k in unnamed):
             return int(which[1:])
         raise InputError(
-            f"{field}: expected the name of one, got {which!r}, of which there are {len(found)}"
+            f"{field}: expected the name of one, got {which!r}, of which there are {len(found)}; "
+            f"there are {shown_names(thing.name for thing in things)}"
         )
     if not is_index(which, len(things)):
         raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")

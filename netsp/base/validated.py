@@ -232,6 +232,26 @@ def _decapitalise(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
+def shown_names(names: Iterable[str | None], max_count: int = 8) -> str:
+    """Return names for messages, each once; ``none with a name`` if there is none.
+
+    Parameters
+    ----------
+    names : iterable of str or None
+        Names of things; None for those without a name.
+    max_count : int
+        Maximum number of names that are listed; the others are counted.
+
+    Examples
+    --------
+    >>> shown_names(["pile", None, "hull", "pile"])
+    "'pile', 'hull'"
+    """
+    known = [shown(name) for name in dict.fromkeys(names) if name]
+    more = f" and {len(known) - max_count} more" if len(known) > max_count else ""
+    return (", ".join(known[:max_count]) or "none with a name") + more
+
+
 def shown(value: Any) -> str:
     """Return the `repr` of a value for messages, of at most 60 characters."""
     try:

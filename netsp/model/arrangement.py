@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from netsp.base.arrays import Bools, Ints
+from netsp.base.validated import shown_names
 
 
 class Goal(Protocol):
@@ -99,7 +100,10 @@ def arrangement_complaint(goals: Sequence[Goal]) -> str | None:
         for j, name in enumerate(goal.after):
             field = f"goals[{k}].after[{j}]"
             if name not in named:
-                return f"{field}: expected the name of another goal, got {name!r}"
+                others = shown_names(n for n in named if n not in (goal.name, goal.choice))
+                return (
+                    f"{field}: expected the name of another goal, got {name!r}; there are {others}"
+                )
             if (cluster[named[name]] == cluster[k]).any():
                 return f"{field}: {name!r} is the goal itself; expected the name of another"
     before = precedence_matrix(goals)

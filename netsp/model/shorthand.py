@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError
 
 from netsp.base.field_types import Integer, Name, Number, Point2, Positive
 from netsp.base.geometry.polygons import check_polygon
-from netsp.base.validated import Model, explain, shown
+from netsp.base.validated import Model, explain, shown, shown_names
 
 MAX_VIEWPOINTS = 1000
 """Format limit of problem files: viewpoints about one structure at one depth."""
@@ -138,7 +138,7 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
         if obstacle is None:
             raise ValueError(
                 f"goals[{k}].inspect: expected the name of an obstacle, got "
-                f"{shown(inspection.inspect)}"
+                f"{shown(inspection.inspect)}; there are {shown_names(named)}"
             )
         try:
             made = inspection.goals(obstacle)

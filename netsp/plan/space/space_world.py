@@ -14,6 +14,7 @@ from netsp.base.arrays import Floats
 from netsp.base.errors import InputError
 from netsp.base.field_types import is_index
 from netsp.base.geometry import polylines
+from netsp.base.validated import shown_names
 from netsp.hsignature import Word
 from netsp.hsignature.words import least_changed
 from netsp.plan.space.planning_context import PlanningContext
@@ -311,7 +312,10 @@ class SpaceWorld:
             return names.index(obstacle)
         if is_index(obstacle, len(names)):
             return int(obstacle)
-        raise InputError(f"obstacle: expected a name or an index of a solid, got {obstacle!r}")
+        raise InputError(
+            f"obstacle: expected a name or an index of a solid, got {obstacle!r}; there are "
+            f"{shown_names(names)}"
+        )
 
     def _field_of(self, solid: int) -> Any:
         """Return the distance field of one solid."""

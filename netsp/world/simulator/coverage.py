@@ -18,6 +18,7 @@ from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.base.compiled.interpretation import interprets
 from netsp.base.compiled.kernel import kernel
 from netsp.base.errors import InputError
+from netsp.base.validated import shown_names
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
@@ -127,11 +128,13 @@ def _surfaces(
     """Return vertices, faces and distance field of each solid to be seen."""
     low, high = extent(scene, places)
     solids = scene.all_solids()
-    named = {s.name for s in solids}
-    named |= {n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None}
+    named = [n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None]
+    named += [s.name for s in solids if s.name]
     for name in inspect or ():
         if name not in named:
-            raise InputError(f"inspect: expected names of solids, got {name!r}")
+            raise InputError(
+                f"inspect: expected names of solids, got {name!r}; there are {shown_names(named)}"
+            )
     return [
         (*surface_of(s.shape, low, high), Scene(solids=(s,)).field())
         for s in solids

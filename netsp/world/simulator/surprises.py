@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from netsp.base.errors import InputError
 from netsp.base.field_types import Name, Point3, Positive
 from netsp.base.files import FileModel
-from netsp.base.validated import Model
+from netsp.base.validated import Model, shown_names
 from netsp.world.mission.mission import Mission, WaypointLike
 from netsp.world.mission.mission_limits import check_bounds
 from netsp.world.scene.field import DistanceField
@@ -151,8 +151,7 @@ def solids_after(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, .
     name = event.vanish if event.move is None else event.move.solid
     field = "vanish" if event.move is None else "move.solid"
     if name not in names:
-        known = ", ".join(repr(n) for n in names[:8] if n) or "none with a name"
-        raise InputError(f"{field}: no solid is named {name!r}; there are {known}")
+        raise InputError(f"{field}: no solid is named {name!r}; there are {shown_names(names)}")
     which = names.index(name)
     new = () if event.move is None else (moved_solid(solids[which], event.move.by),)
     return (*solids[:which], *new, *solids[which + 1 :])
