@@ -1,6 +1,7 @@
 """Meshes as people have them: what is solid, what is a sheet, and what a note says."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -182,6 +183,42 @@ def test_a_stated_thickness_chooses_the_voxels(tmp_path):
     field = scene_of_file(tmp_path, sheet, thickness=0.06).field()
     assert field.voxel == pytest.approx(0.015)
     assert field.distance([0.5, 0.4, 0.2]) == pytest.approx(0.17, abs=1e-3)
+
+
+SHEET = trimesh.Trimesh(BALL.vertices, BALL.faces[BALL.triangles_center[:, 2] < 0.0])
+"""Lower half of a ball, 2 m across."""
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"thickness": 50}, "mesh.thickness: 50 is more than the mesh is across, 2; expected at"),
+        ({"thickness": 1e-5}, "mesh.thickness: 1e-05 needs voxels of 2.5e-06"),
+        ({"thickness": 0.1, "voxel": 0.05}, "mesh.thickness: 0.1 is less than 4 voxels of 0.05"),
+        ({"voxel": 5}, "mesh.voxel: 5 is larger than the mesh, 2 across; expected at most 0.5"),
+        ({"voxel": 0.7}, "mesh.voxel: 0.7 makes sheets and thin parts 2.8 thick"),
+        ({"scale": 1e-4}, "mesh.scale: 0.0001 makes the mesh 0.0002 m across; expected 0.01 to"),
+        ({"scale": 1e4}, "mesh.scale: 10000 makes the mesh 2e+04 m across; expected 0.01 to 5000"),
+    ],
+)
+def test_sizes_that_make_no_sense_are_refused_by_name(tmp_path, more, message):
+    scene = scene_of_file(tmp_path, SHEET, **more)
+    with pytest.raises(InputError, match=re.escape(message)):
+        scene.field()
+
+
+def test_the_greatest_voxel_that_an_error_names_is_taken(tmp_path):
+    scene = scene_of_file(tmp_path, SHEET, voxel=5)
+    with pytest.raises(InputError) as error:
+        scene.field()
+    better = float(str(error.value).split("at most ")[-1])
+    assert scene_of_file(tmp_path, SHEET, voxel=better).field().distance([0, 0, -1]) < 0
+
+
+def test_a_mesh_in_millimetres_is_told_the_scale(tmp_path):
+    scene = scene_of_file(tmp_path, SHEET.copy().apply_scale(8000.0))
+    with pytest.raises(InputError, match=r'a file in millimetres needs "scale": 0\.001'):
+        scene.reading_notes()
 
 
 def seen_from_six_sides(scene, clearance=0.3):

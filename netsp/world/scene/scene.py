@@ -24,7 +24,7 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.grid import VoxelGrid
 from netsp.world.scene.mesh_body import MeshBody, Surface, body_of_mesh
 from netsp.world.scene.readers import Placement, read_cloud_file, read_mesh_file
-from netsp.world.scene.scene_policy import FloorPolicy, GridPolicy, MeshPolicy, ScenePolicy
+from netsp.world.scene.scene_policy import FloorPolicy, MeshPolicy, ScenePolicy
 from netsp.world.scene.seams import seam_boxes
 from netsp.world.scene.shapes import (
     Box,
@@ -363,7 +363,7 @@ class Scene(FileModel):
         policy = policy or ScenePolicy()
         parts, points, notes = self._files(policy.floor)
         options: dict[str, Any] = {
-            "voxel": voxel or self._voxel(policy.grid),
+            "voxel": voxel or self._voxel(),
             "memory_limit": memory_limit,
             "on_progress": on_progress,
             "source": self._source(),
@@ -394,9 +394,23 @@ class Scene(FileModel):
             if name != "mesh"
         }
         if self.mesh is not None:
+            self._check_size(parts["mesh"][0], policy or MeshPolicy())
             body = body_of_mesh(*parts["mesh"], surface=self.mesh.surface, policy=policy)
             found = {"mesh": replace(body, thickness=self.mesh.thickness), **found}
         return found
+
+    def _check_size(self, vertices: Floats, policy: MeshPolicy) -> None:
+        """Raise InputError if the scale makes the mesh so small or large that no robot inspects
+        it."""
+        assert self.mesh is not None
+        size, scale = float(np.ptp(vertices, axis=0).max()), self.mesh.scale
+        low, high = policy.min_allowed_extent_m, policy.max_allowed_extent_m
+        if not low <= size <= high:
+            hint = '; a file in millimetres needs "scale": 0.001' if scale == 1.0 < size else ""
+            raise InputError(
+                f"{self.mesh.file}: mesh.scale: {scale:g} makes the mesh {size:.3g} m across; "
+                f"expected {low:g} to {high:g} m{hint}"
+            )
 
     def mesh_bodies(self, policy: ScenePolicy | None = None) -> dict[str, MeshBody]:
         """Return the bodies of mesh and sea floor, by the names ``mesh`` and ``floor``.
@@ -418,12 +432,10 @@ class Scene(FileModel):
             water = np.array([np.minimum(water[0], low), np.maximum(water[1], high)])
         return water
 
-    def _voxel(self, policy: GridPolicy) -> float | None:
-        """Return the smallest edge of voxels that the scene's files state or that shows a mesh of
-        its thickness, metres."""
+    def _voxel(self) -> float | None:
+        """Return the smallest edge of voxels that the scene's files state, metres; None if none
+        does."""
         given = [f.voxel for f in (self.floor, self.mesh, self.cloud) if f is not None and f.voxel]
-        if not given and self.mesh is not None and self.mesh.thickness is not None:
-            return self.mesh.thickness / (2.0 * policy.sheet_voxels)
         return min(given) if given else None
 
     def _source(self) -> str:

@@ -101,7 +101,9 @@ class MeshPolicy:
     min_solid_faces
         Smallest number of faces of an open part that may be a solid.
     min_extent_m, max_extent_m
-        Sizes of a mesh, metres, outside of which its unit is doubted.
+        Sizes of a mesh, metres, outside of which a note doubts its unit.
+    min_allowed_extent_m, max_allowed_extent_m
+        Sizes of a mesh, metres, outside of which a scene is refused.
     """
 
     weld_share: float = 1e-6
@@ -112,6 +114,8 @@ class MeshPolicy:
     min_solid_faces: int = 4
     min_extent_m: float = 0.2
     max_extent_m: float = 250.0
+    min_allowed_extent_m: float = 0.01
+    max_allowed_extent_m: float = 5_000.0
 
     def __post_init__(self) -> None:
         check_positive(self)

@@ -63,9 +63,11 @@ def grid_of_bodies(
     """
     mesh = _Triangles.from_bodies(bodies)
     policy = policy or GridPolicy()
-    size = _size(mesh.low, mesh.high, voxel, source, policy)
-    shell = _shell(bodies, size, source, policy)
-    place = _Place(mesh.low, mesh.high, size, memory_limit, source)
+    thickness = _thickness(bodies, source)
+    size = _size(mesh.low, mesh.high, voxel, source, policy, thickness)
+    shell = _shell(thickness, size, source, policy)
+    sized_by = thickness if voxel is None else None
+    place = _Place(mesh.low, mesh.high, size, memory_limit, source, sized_by)
     triangles = None if mesh.has_sheet else mesh.solid
     half = shell / size if mesh.has_sheet else 0.0
     lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
@@ -147,11 +149,11 @@ class _Triangles:
         """Return the signed distances at the points of a lattice, notes on what was assumed, and
         growth beyond the triangles' box, metres."""
         size, notes = lattice.size, []
-        if size > float((self.high - self.low).max()):
-            raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+        _check_voxel("mesh", size, self.low, self.high, source)
         values = lattice.closest(self.sites, on_progress, with_owners=False)[0]
         grow = 0.0
         if not len(self.solid):
+            self._check_shell(shell, size, source)
             values -= np.float32(shell)
             grow = shell
         else:
@@ -170,6 +172,7 @@ class _Triangles:
                 )
                 sheet = np.concatenate([sheet, self.sites[: len(self.solid)][thin]])
             if len(sheet):
+                self._check_shell(shell, size, source)
                 near = lattice.closest(sheet, None, with_owners=False)[0]
                 values = np.minimum(values, near - np.float32(shell))
                 grow = shell
@@ -181,6 +184,16 @@ class _Triangles:
             values[enclosed] = -np.abs(values[enclosed])
             notes.append("closed cavities count as solid")
         return values, notes, grow
+
+    def _check_shell(self, shell: float, size: float, source: str) -> None:
+        """Raise InputError if sheets are thicker than the mesh is across."""
+        side = float((self.high - self.low).max())
+        if 2.0 * shell > side * (1.0 + 1e-9):
+            raise InputError(
+                f"{source}: mesh.voxel: {size:.3g} makes sheets and thin parts {2 * shell:.3g} "
+                f"thick, more than the mesh is across, {side:.3g}; expected at most "
+                f"{_rounded_down(0.5 * side * size / shell)}"
+            )
 
     def _turn_inside(self, lattice: Lattice, values: Singles) -> list[str]:
         """Negate the values inside the solid; return notes on its parts."""
@@ -215,18 +228,49 @@ _TRIED = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3],
 """Tolerance of the search for thin parts: the places of a triangle, by weights of its corners."""
 
 
-def _shell(bodies: list[MeshBody], size: float, source: str, policy: GridPolicy) -> float:
+def _thickness(bodies: list[MeshBody], source: str) -> float | None:
+    """Return the largest thickness that bodies state for sheets, metres; None if none does.
+
+    InputError if it is more than the mesh is across.
+    """
+    stated = [b for b in bodies if b.thickness is not None]
+    for body in stated:
+        side = float(np.ptp(body.vertices, axis=0).max())
+        if body.thickness is not None and body.thickness > side > 0.0:
+            raise InputError(
+                f"{source}: mesh.thickness: {body.thickness:.3g} is more than the mesh is across, "
+                f"{side:.3g}; expected at most {_rounded_down(side)}"
+            )
+    return max((b.thickness for b in stated if b.thickness is not None), default=None)
+
+
+def _shell(thickness: float | None, size: float, source: str, policy: GridPolicy) -> float:
     """Return half the thickness of sheets, metres."""
-    thickness = max((b.thickness for b in bodies if b.thickness is not None), default=None)
     if thickness is None:
         return policy.sheet_voxels * size
     if not thickness >= 2.0 * policy.sheet_voxels * size * (1.0 - 1e-9):
         raise InputError(
-            f"{source}: thickness: {thickness:.3g} is less than {2 * policy.sheet_voxels:g} voxels "
-            f"of {size:.3g}; expected more, or voxels of at most "
+            f"{source}: mesh.thickness: {thickness:.3g} is less than {2 * policy.sheet_voxels:g} "
+            f"voxels of {size:.3g}; expected more, or voxels of at most "
             f"{0.5 * thickness / policy.sheet_voxels:.3g}"
         )
     return 0.5 * thickness
+
+
+def _check_voxel(kind: str, size: float, low: Floats, high: Floats, source: str) -> None:
+    """Raise InputError if voxels are larger than a mesh or cloud in the box from low to high."""
+    side = float((high - low).max())
+    if size > side:
+        raise InputError(
+            f"{source}: {kind}.voxel: {size:.3g} is larger than the {kind}, {side:.3g} across; "
+            f"expected at most {_rounded_down(0.25 * side)}"
+        )
+
+
+def _rounded_down(number: float) -> str:
+    """Return a positive number with two digits, never more than it is."""
+    unit = 10.0 ** (math.floor(math.log10(number)) - 1)
+    return f"{math.floor(number / unit + 1e-9) * unit:.2g}"
 
 
 def _double_areas(triangles: Floats) -> Floats:
@@ -368,12 +412,13 @@ def grid_of_bodies_and_cloud(
     low = np.minimum(mesh.low, p.min(0))
     high = np.maximum(mesh.high, p.max(0))
     policy = policy or GridPolicy()
-    size = _size(low, high, voxel, source, policy)
-    shell = _shell(bodies, size, source, policy)
+    thickness = _thickness(bodies, source)
+    size = _size(low, high, voxel, source, policy, thickness)
+    shell = _shell(thickness, size, source, policy)
     extra = _spacing(p)
     flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # as triangles, to place blocks
     lattice = _lattice(
-        _Place(low, high, size, memory_limit, source),
+        _Place(low, high, size, memory_limit, source, thickness if voxel is None else None),
         np.vstack([mesh.sites, flat]),
         policy,
         shell=shell / size if mesh.has_sheet else 0.0,
@@ -393,13 +438,14 @@ def grid_of_bodies_and_cloud(
 @dataclass(frozen=True)
 class _Place:
     """Box (corners `low` and `high`) of a grid, edge of its voxels, memory in GiB, and the name of
-    its source for messages."""
+    its source for messages. If the thickness of sheets decided the edge, `thickness` states it."""
 
     low: Floats
     high: Floats
     size: float
     memory_limit: float
     source: str
+    thickness: float | None = None
 
 
 def _lattice(
@@ -454,20 +500,37 @@ def _lattice(
             return lattice
     # blocks lie along surfaces, cells fill the box
     better = size * math.sqrt(need / memory) * 1.05
+    if place.thickness is not None:
+        raise InputError(
+            f"{place.source}: mesh.thickness: {place.thickness:.3g} needs voxels of {size:.3g}, "
+            f"which need {need / 2**30:.3g} GiB, more than {place.memory_limit:g}; expected "
+            f"{better / size * place.thickness:.2g} or more"
+        )
     raise InputError(
         f"{place.source}: voxels of {size:.3g} need {need / 2**30:.3g} GiB, more than "
         f"{place.memory_limit:g}; expected voxels of {better:.2g} or more"
     )
 
 
-def _size(low: Floats, high: Floats, voxel: float | None, source: str, policy: GridPolicy) -> float:
-    """Return the edge of a voxel, metres."""
+def _size(
+    low: Floats,
+    high: Floats,
+    voxel: float | None,
+    source: str,
+    policy: GridPolicy,
+    thickness: float | None = None,
+) -> float:
+    """Return the edge of a voxel, metres: as stated, or to show the thickness of sheets."""
     if voxel is not None and not 0.0 < voxel < math.inf:
         raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
     side = float((high - low).max())
     if side <= 0.0:
         raise InputError(f"{source}: all points are the same")
-    return voxel if voxel is not None else side / policy.default_voxels
+    if voxel is not None:
+        return voxel
+    if thickness is None:
+        return side / policy.default_voxels
+    return 0.5 * thickness / policy.sheet_voxels
 
 
 def _spacing(points: Floats) -> float:
