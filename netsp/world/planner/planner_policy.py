@@ -22,11 +22,15 @@ class PreviewPolicy:
         there reaches the limit. A larger share measures fewer lengths exactly.
     min_step_s
         Shortest time between two places of the simulation while the anchor moves, s.
+    max_cut
+        Depth to which a path may cut into solids if any other path does not, as a multiple of the
+        mission's `delta`.
     """
 
     limit_margin: float = 0.004
     floor_share: float = 0.95
     min_step_s: float = 0.1
+    max_cut: float = 0.01
 
     def __post_init__(self) -> None:
         check_positive(self)

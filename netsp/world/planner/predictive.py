@@ -52,6 +52,9 @@ class PredictivePlanner(Planner):
     _checked: float = 0.0
     _rest_checked: float = 0.0
     _is_retreating: bool = False
+    _may_cut: bool = False
+    _has_met_solid: bool = False
+    _shortest: Tether | None = None
     _previous_excess: float = 0.0
     _candidates: list[Candidate] = field(default_factory=list)
 
@@ -81,7 +84,7 @@ class PredictivePlanner(Planner):
             return False
         self._is_retreating = False
         first = self._planned != self.index
-        self._planned, self._checked = self.index, self.now
+        self._planned, self._checked, self._may_cut = self.index, self.now, False
         limit = self.limit
         leg = self._leg(robot, tether) if first else None
         if leg is not None and self._fits(tether, leg, limit):
@@ -91,13 +94,12 @@ class PredictivePlanner(Planner):
         if straight is not None:
             self.path, self.mode = straight[1:], NORMAL
             return True
-        path, mode = self._shortest_feasible(robot, tether, limit)
+        path, mode = self._detour(robot, tether, limit)
         if path is None and self.is_anchor_moving:
             self._wait(robot, tether, limit)
             return True
         if path is None:
-            path = self._path_by_anchor(tether, limit)
-        if path is None:
+            self._leave_out_of_reach(limit)
             return True
         better = self.refined(path)
         if better is not path and self._fits(tether, better, limit):
@@ -299,6 +301,7 @@ class PredictivePlanner(Planner):
             self.track if self.is_anchor_moving else None,
             self.now,
             self.policy.preview,
+            None if self._may_cut else self.policy.preview.max_cut * self.mission.delta,
         )
 
     @property
@@ -313,9 +316,13 @@ class PredictivePlanner(Planner):
         self, tether: Tether, path: Floats, limit: float, stay_s: float | None = None
     ) -> bool:
         """Return whether the tether stays within the limit all along a path, and at its end."""
+        preview = self._preview
+        if preview.meets_solid(path):
+            self._has_met_solid = True
+            return False
         self._preview_count += 1
         self._previewed_length += polylines.length(path)
-        return self._preview.fits(tether, path, limit, self._stay_s if stay_s is None else stay_s)
+        return preview.fits(tether, path, limit, self._stay_s if stay_s is None else stay_s)
 
     def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """Return the straight path to the waypoint, or to where it counts as visited, if the tether
@@ -330,6 +337,21 @@ class PredictivePlanner(Planner):
             if polylines.length(path) <= far:
                 return path
         return None
+
+    def _detour(self, robot: Floats, tether: Tether, limit: float) -> tuple[Floats | None, str]:
+        """Return a path on which the tether fits, and its mode: a short one, or one by the anchor.
+
+        Only if every such path cuts into a solid, the path may, by less than would stop the robot.
+        The tether may lie between solids that leave no room for the robot.
+        """
+        for self._may_cut in (False, True):
+            self._has_met_solid = False
+            path, mode = self._shortest_feasible(robot, tether, limit)
+            if path is None and not self.is_anchor_moving:
+                path = self._path_by_anchor(tether, limit)
+            if path is not None or not self._has_met_solid:
+                break
+        return path, mode
 
     def _shortest_feasible(
         self, robot: Floats, tether: Tether, limit: float
@@ -463,7 +485,7 @@ class PredictivePlanner(Planner):
             and not self._is_overtaken(robot, tether)
         ):
             return False
-        self._checked = self.now
+        self._checked, self._may_cut = self.now, False
         if self.excess_payout > self.predictive.snag_tolerance:
             back = polylines.points_along(self.trail[::-1], self.fine_spacing)
             back = np.vstack([back, self.home_tether.nodes[1:]])
@@ -504,13 +526,19 @@ class PredictivePlanner(Planner):
         free."""
         line = self.back_along(tether)
         path = self.pull_taut(line)
-        far, end = self._preview.follow(tether, path, self.limit, 0.0)
-        if np.isinf(far):
-            self._is_sure_of_home = self._is_free(end)
-        else:
+        for self._may_cut in (False, True):
+            self._has_met_solid = self._preview.meets_solid(path)
+            far, end = self._preview.follow(tether, path, self.limit, 0.0)
+            if np.isinf(far):
+                self._is_sure_of_home = self._is_free(end)
+                break
             found = self._tautest(tether, line, self.limit)
-            path = line if found is None else found
-            self._is_sure_of_home = self._comes_free(tether, path)
+            if found is not None or not self._has_met_solid:
+                path = line if found is None else found
+                self._is_sure_of_home = self._comes_free(tether, path)
+                break
+        else:
+            path, self._is_sure_of_home = line, self._comes_free(tether, line)
         if not self._is_sure_of_home and path is not line:
             path, self._is_sure_of_home = line, self._comes_free(tether, line)
         return path
@@ -598,31 +626,33 @@ class PredictivePlanner(Planner):
         return length > limit
 
     def _path_by_anchor(self, tether: Tether, limit: float) -> Floats | None:
-        """Return a path back to the anchor and on beside the shortest known tether to the waypoint.
-
-        If the tether does not fit on it either, leave out the waypoint with the reason, and return
-        None.
-        """
-        shortest = self._shortest_tether(limit)
-        if shortest is None:
-            self.leave_out("no free path to it")
+        """Return a path back to the anchor and on beside the shortest known tether to the waypoint;
+        None if the tether does not fit on it either."""
+        shortest, near = self._shortest_tether(limit), 0.8 * self.mission.reach
+        self._shortest = shortest
+        if shortest is None or self.payout(shortest) - near > limit:
             return None
-        needs, near = self.payout(shortest), 0.8 * self.mission.reach
-        if needs - near <= limit:
-            path = np.vstack(
-                [self.off_surfaces(tether.nodes[::-1]), self.off_surfaces(shortest.nodes)[1:]]
-            )
-            for short in (0.0, near):
-                part = polylines.part(path, 0.0, polylines.length(path) - short)
-                if self._fits(tether, part, limit):
-                    return part
+        path = np.vstack(
+            [self.off_surfaces(tether.nodes[::-1]), self.off_surfaces(shortest.nodes)[1:]]
+        )
+        for short in (0.0, near):
+            part = polylines.part(path, 0.0, polylines.length(path) - short)
+            if self._fits(tether, part, limit):
+                return part
+        return None
+
+    def _leave_out_of_reach(self, limit: float) -> None:
+        """Leave out the waypoint after `_detour` has found no path, with the reason."""
+        if self._shortest is None:
+            self.leave_out("no free path to it")
+            return
+        needs = self.payout(self._shortest)
         limits = f"the limit is {self.mission.tether_length:g} m{self._reserve_words}"
         self.leave_out(
             f"out of reach: it needs {needs:.2f} m of tether, {limits}"
-            if needs - near > limit
+            if needs - 0.8 * self.mission.reach > limit
             else f"no path found on which the tether fits, though {needs:.2f} m would do; {limits}"
         )
-        return None
 
     def _shortest_tether(self, limit: float) -> Tether | None:
         """Return the shortest tether at the waypoint among the classes of the last search."""

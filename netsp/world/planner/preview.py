@@ -11,6 +11,7 @@ from netsp.base.arrays import Floats
 from netsp.base.geometry import polylines
 from netsp.world.mission.anchor_track import AnchorTrack
 from netsp.world.mission.mission import Mission
+from netsp.world.paths.standoff import are_in_sight
 from netsp.world.planner.planner_policy import PreviewPolicy
 from netsp.world.tether import GeodesicTether, Tether
 from netsp.world.tether.load import Load, payout, turning
@@ -38,6 +39,9 @@ class TetherPreview:
         Time since the start of the mission, s.
     policy : PreviewPolicy
         Steps and margins.
+    max_depth : float, optional
+        Depth to which a path may lead into solids, metres, more than 0; by default `CONTACT_DEPTH`
+        times delta, at which the robot would be stopped.
     """
 
     mission: Mission
@@ -46,6 +50,7 @@ class TetherPreview:
     track: AnchorTrack | None
     now: float
     policy: PreviewPolicy = PreviewPolicy()
+    max_depth: float | None = None
 
     def follow(
         self, tether: Tether, path: Floats, limit: float, stay_s: float
@@ -70,7 +75,7 @@ class TetherPreview:
         tether : Tether
             Tether at the end if it lasts; otherwise a tether on the way.
         """
-        if self._meets_solid(path):
+        if self.meets_solid(path):
             return 0.0, tether
         if self.track is not None:
             return self._with_moving_anchor(self.track, tether, path, limit, stay_s)
@@ -106,11 +111,21 @@ class TetherPreview:
         """Distance between two simulated places if little of the limit is left, metres."""
         return max(0.5 * self.mission.delta, 0.02)
 
-    def _meets_solid(self, path: Floats) -> bool:
-        """Return whether a path leads so deep into a solid that the mission would end."""
-        points = polylines.dense(path, self.mission.delta)
-        depth = CONTACT_DEPTH * self.mission.delta
-        return bool(len(points) and self.model.field.distance(points).min() < -depth)
+    def meets_solid(self, path: Floats) -> bool:
+        """Return whether a path (k, 3) leads deeper into a solid than `max_depth` and than it
+        begins.
+
+        Between the places that are tested, the path is at most half as deep again.
+        """
+        if not len(path):
+            return False
+        field, delta = self.model.field, self.mission.delta
+        depth = CONTACT_DEPTH * delta if self.max_depth is None else self.max_depth
+        begin = -float(field.distance(path[0]))
+        if len(path) < 2:
+            return begin > depth
+        depth = max(depth, 1.01 * begin)
+        return not bool(are_in_sight(field.arrays, path[:-1], path[1:], depth).all())
 
     def _under_load(
         self, load: Load, tether: Tether, path: Floats, limit: float
