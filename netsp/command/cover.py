@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
             {
                 "waypoints": len(result.viewpoints),
                 "fewest_possible": result.bound,
-                "seen": result.seen,
+                "seen": result.counted,
                 "visible": result.visible,
                 "candidates": result.candidates,
                 "objective": result.objective,
@@ -109,7 +109,7 @@ def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> 
     if found.objective == "time":
         chosen = "chosen together with their tour, for a short time"
     lines = [
-        f"seen      {100 * found.seen:.1f} % of the surface; from all {found.candidates} "
+        f"seen      {100 * found.counted:.1f} % of the surface; from all {found.candidates} "
         f"candidates together {100 * found.visible:.1f} %",
         f"waypoints {count}; {chosen}",
         f"tour      about {found.tour_length:.1f} {units}, {found.tour_s:.0f} s at "

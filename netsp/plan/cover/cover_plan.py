@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from netsp.plan.cover.viewpoints import (
     coarsen,
     find_more_viewpoints,
     find_viewpoints,
+    share_seen,
 )
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
@@ -55,7 +56,10 @@ class Cover(ComparesArrays):
     bound : int
         Lower bound on the number of viewpoints among these that see as much.
     seen : float
-        Share of the whole surface that is seen from the waypoints.
+        Share of the whole surface that is seen from the waypoints, on the patches by which they
+        were chosen. The choice makes the most of these, so `counted` is a little smaller.
+    counted : float
+        Same share on the finer patches that a flight counts.
     visible : float
         Share of it that is seen from any of the candidates.
     visible_patches : ndarray of bool, shape (m,)
@@ -75,6 +79,7 @@ class Cover(ComparesArrays):
     candidates: int
     bound: int
     seen: float
+    counted: float
     visible: float
     visible_patches: Bools
     objective: Objective
@@ -85,7 +90,7 @@ class Cover(ComparesArrays):
         """Return the numbers on one line."""
         return (
             f"<Cover: {len(self.viewpoints)} viewpoints (no fewer than {self.bound}) see "
-            f"{100 * self.seen:.1f} % of the surface, all {self.candidates} see "
+            f"{100 * self.counted:.1f} % of the surface, all {self.candidates} see "
             f"{100 * self.visible:.1f} %>"
         )
 
@@ -223,7 +228,8 @@ def cover(
             found = find_more_viewpoints(viewer, found, more_clock, report)
         chooser = TourChooser(viewer, start_place, mission.speed, share, clock, seed, report, fine)
         choice = chooser.choose(found, objective)
-        return _build_cover(mission, patches, found, choice, reach, share, objective)
+        counted = share_seen(replace(viewer, patches=fine), found.subset(choice.order))
+        return _build_cover(mission, patches, found, choice, counted, reach, share, objective)
 
 
 def _check(
@@ -331,6 +337,7 @@ def _build_cover(
     patches: Patches,
     found: Viewpoints,
     choice: TourChoice,
+    counted: float,
     reach: _Reach,
     share: float,
     objective: Objective,
@@ -360,6 +367,7 @@ def _build_cover(
         len(found),
         choice.bound,
         float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
+        counted,
         float(areas[visible].sum() / areas.sum()),
         visible,
         objective,

@@ -164,7 +164,8 @@ def _shown_meshes(
         if not len(triangles):
             continue
         thickness = body.thickness or 2.0 * GridPolicy().sheet_voxels * voxel
-        c, n, a = mesh_patches(field, body, triangles, size, 0.5 * thickness + voxel)
+        merged_size = policy.mesh_patch_ratio * size
+        c, n, a = mesh_patches(field, body, triangles, merged_size, 0.5 * thickness + voxel)
         water = OuterWater.about(field, body, clearance, places, policy)
         shown = exposed(body, water, c, n, clearance, 0.5 * voxel, policy)
         yield c[shown], n[shown], a[shown]

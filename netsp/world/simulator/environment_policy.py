@@ -51,6 +51,9 @@ class CoveragePolicy:
     ----------
     max_patches
         Maximum number of large triangles of a surface; a finer surface is refused.
+    mesh_patch_ratio
+        Edge of the cubes in which patches of a mesh are merged, as a multiple of the camera's
+        patch. A flight counts these patches; `netsp cover` chooses by coarser ones.
     max_water_cells
         Maximum number of cells along the longest side of a mesh in the search for the water that
         the robot gets to.
@@ -63,6 +66,7 @@ class CoveragePolicy:
     """
 
     max_patches: int = 200_000
+    mesh_patch_ratio: float = 0.5
     max_water_cells: int = 80
     sight_rays: int = 16
     sight_steps: int = 8
