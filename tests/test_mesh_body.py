@@ -14,6 +14,7 @@ from netsp.world.mission.equipment import Camera
 from netsp.world.scene.face_tree import FaceTree
 from netsp.world.scene.mesh_body import body_of_mesh
 from netsp.world.scene.mesh_edges import edges_of, open_loops, pieces_of
+from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.voxels import grid_of_triangles
 from netsp.world.simulator.coverage import Coverage, surface_patches
 from tests.test_scene import voxel_field
@@ -139,6 +140,43 @@ def test_spoiled_meshes_give_the_solid_of_the_sound_one(how):
     assert bool(spoiled.notes) == (how != "faces apart")
 
 
+def soup_of_ball():
+    """Faces of a ball, each shrunk to leave gaps, turned at random; and a flag far from it."""
+    rng = np.random.default_rng(5)
+    triangles = np.asarray(BALL.triangles)
+    middles = triangles.mean(axis=1, keepdims=True)
+    triangles = middles + rng.uniform(0.94, 1.0, (len(triangles), 1, 1)) * (triangles - middles)
+    triangles += rng.normal(scale=1e-3, size=(len(triangles), 1, 3))
+    flip = rng.random(len(triangles)) < 0.5
+    triangles[flip] = triangles[flip][:, ::-1]
+    flag = np.array([[[2.0, 0, 0], [3.0, 0, 0], [2.0, 1.0, 0]]])
+    triangles = np.concatenate([triangles, flag])
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("max_dense_points", [10**7, 10**3])
+def test_a_soup_around_a_ball_is_solid_and_a_flag_beside_it_a_sheet(max_dense_points):
+    policy = GridPolicy(max_dense_points=max_dense_points)
+    grid = grid_of_triangles(*soup_of_ball(), voxel=0.05, policy=policy)
+    assert (grid.table is None) == (max_dense_points > 10**6)
+    assert any("by the winding number" in n for n in grid.notes)
+    p = np.random.default_rng(1).uniform(-1.3, 1.3, (2000, 3))
+    depth = 1.0 - np.linalg.norm(p, axis=1)
+    p, depth = p[np.abs(depth) > 0.06], depth[np.abs(depth) > 0.06]
+    field = voxel_field(grid)
+    assert (np.sign(field.distance(p)) == -np.sign(depth)).all()
+    assert field.distance([2.3, 0.3, 0.4]) == pytest.approx(0.3, abs=0.01)
+    assert field.distance([2.3, 0.3, -0.4]) == pytest.approx(0.3, abs=0.01)
+
+
+def test_faces_that_enclose_nothing_together_are_sheets():
+    rng = np.random.default_rng(2)
+    triangles = rng.normal(size=(100, 3, 3))
+    faces = np.arange(300).reshape(-1, 3)
+    assert not len(body_of_mesh(triangles.reshape(-1, 3), faces).loose)
+    assert not len(body_of_mesh(*soup_of_ball(), surface="sheet").loose)
+
+
 def test_a_hollow_half_ball_is_a_sheet_unless_the_scene_says_solid():
     half = BALL.faces[BALL.triangles_center[:, 2] < 0.0]
     assert not len(body_of_mesh(BALL.vertices, half).solid)
@@ -253,6 +291,20 @@ def test_both_sides_of_a_sheet_count_and_neither_side_of_a_slit(tmp_path):
     area, _ = seen_from_six_sides(scene_of_file(tmp_path, pair, voxel=0.03))
     rim = 4.0 - (2.0 - 2.0 * 0.06 * np.tan(np.radians(75.0))) ** 2
     assert 23.5 < area < 24.0 + 2.0 * rim + 0.5
+
+
+@pytest.mark.parametrize(("degrees", "voxel", "is_noted"), [(15, 0.02, True), (90, 0.005, False)])
+def test_sheets_that_hide_one_another_are_noted(degrees, voxel, is_noted):
+    """Two squares that share an edge hide one another near it, over a length of their thickness
+    times the cotangent of half the angle."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    vertices = np.array([[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0], [c, 1, s], [c, 0, s]])
+    grid = grid_of_triangles(vertices, [[0, 1, 2], [0, 2, 3], [0, 1, 4], [0, 4, 5]], voxel=voxel)
+    noted = [n for n in grid.notes if "within the thickness of others" in n]
+    assert bool(noted) == is_noted
+    if noted:
+        expected = 0.5 * 4 * voxel / np.tan(np.radians(0.5 * degrees))
+        assert float(noted[0].split(" %")[0]) / 100 == pytest.approx(expected / 2, rel=0.5)
 
 
 def test_scenes_name_the_defects_of_a_mesh(tmp_path):

@@ -183,7 +183,7 @@ def test_meshes_of_no_use_are_refused(vertices, faces, more, message):
 
 def test_voxels_too_large_for_a_mesh_are_refused():
     box = trimesh.creation.box((1, 1, 1))
-    with pytest.raises(InputError, match="smaller voxels"):
+    with pytest.raises(InputError, match=r"mesh\.voxel: 50 is larger than the mesh"):
         grid_of_triangles(box.vertices, box.faces, voxel=50.0)
 
 

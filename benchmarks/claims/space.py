@@ -253,6 +253,52 @@ def under_way() -> tuple[str, bool]:
     return f"{free} of {len(runs)} home and free, {len(faults)} faults", free == 3 and not faults
 
 
+def spoiled_meshes() -> tuple[str, bool]:
+    """A scan with holes that is inside out, a soup of faces and an open disc, each looked at from
+    one place, beside the share of a cap of a ball and one side of two."""
+    import tempfile
+    from pathlib import Path
+
+    import numpy as np
+    import trimesh
+    from meshes import spoiled
+
+    from netsp.world import Scene
+    from netsp.world.mission.equipment import Camera
+    from netsp.world.simulator.coverage import Coverage, surface_patches
+
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=2.0)
+    middles = np.asarray(ball.triangles_center)
+    behind = np.array([[-2.0, 0, 0], [-1.2, 1.6, 0], [-1.2, 0, 1.6]])
+    holes = np.linalg.norm(middles[:, None] - behind, axis=2).min(axis=1) < 0.3
+    triangles = np.asarray(ball.triangles)
+    disc = trimesh.creation.cylinder(2.0, 1.0, sections=64)
+    disc_faces = np.asarray(disc.triangles)[np.asarray(disc.face_normals)[:, 2] > 0.9]
+    eye = np.array([5.0, 0.0, 0.0])
+    cap = 2.0 * np.pi * 2.0**2 * (1.0 - 2.0 / eye[0])
+    cases = [
+        (spoiled(triangles[~holes], "inverted"), cap),
+        (spoiled(triangles, "soup"), cap),
+        (disc_faces[..., [2, 1, 0]], None),
+    ]
+    worst = 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mesh.stl"
+        for case, seen in cases:
+            faces = np.arange(3 * len(case)).reshape(-1, 3)
+            trimesh.Trimesh(case.reshape(-1, 3), faces, process=False).export(path)
+            scene = Scene.model_validate({"mesh": {"file": str(path), "voxel": 0.05}})
+            field, camera = scene.field(), Camera(range=10.0, field_of_view=120.0, patch=0.15)
+            patches = surface_patches(scene, field, 0.15, eye[None], clearance=0.3)
+            coverage = Coverage(patches, field, camera)
+            coverage.look(eye, np.pi)
+            u, v = case[:, 1] - case[:, 0], case[:, 2] - case[:, 0]
+            area = 0.5 * np.linalg.norm(np.cross(u, v), axis=1).sum()
+            expected = 0.5 if seen is None else seen / area
+            worst = max(worst, abs(coverage.share - expected))
+    return f"{100 * worst:.1f} points", bool(worst <= 0.02)
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("words: groups of seven scenes", "as known", groups)
@@ -263,6 +309,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("solve: a planned order again, in 2 s", "no worse; verified", no_worse)
     yield Claim("bounds in space: walls with slots", "none above a known tour", bounds)
     yield Claim("bounds in space: random scenes of eleven kinds", "none above a path or tour", law)
+    yield Claim("meshes: holes, inside out, a soup, a sheet", "2 points", spoiled_meshes)
     yield solved("basin", 33.0, 25.0)
     yield solved("ring", 46.0, 15.0)
     yield solved("hull", 80.0, 35.0)

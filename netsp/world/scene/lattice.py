@@ -6,6 +6,7 @@ Both kinds number their points in one row, so `netsp.world.scene.voxels` treats 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from netsp.base.time_flags import Flag
 from netsp.world.scene import blocks as compiled
 from netsp.world.scene.blocks import REACHED, WATER
 from netsp.world.scene.closest import Owners, nearest_sites, sweep, windings
+from netsp.world.scene.face_tree import FaceTree
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.scene_policy import GridPolicy
 
@@ -58,6 +60,25 @@ class Dense:
         around = windings(triangles, self.origin, self.size, self.counts).ravel()
         np.negative(values, out=values, where=around != 0)
         return int(np.abs(around).max(initial=0))
+
+    def turn_wound(self, values: Singles, tree: FaceTree) -> None:
+        """Negate the values where the generalised winding number of faces is 0.5 or more.
+
+        It is taken at each point near the faces. Other points have the sign of the nearest of
+        every fourth point along each axis; no face lies between the two.
+        """
+        step = SIDE // 2
+        axes = [
+            self.origin[k] + self.size * np.arange(0, n, step) for k, n in enumerate(self.counts)
+        ]
+        coarse = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        wound = np.abs(tree.windings(coarse.reshape(-1, 3))).reshape(coarse.shape[:3]) >= 0.5
+        near = []
+        for n in self.counts:
+            nearest = (np.arange(n) + step // 2) // step
+            near.append(np.minimum(nearest, (n - 1) // step))
+        inside = wound[np.ix_(*near)].ravel()
+        _turn_near(self, values, inside, tree, step * self.size)
 
     def unreached(self, values: Singles) -> Bools:
         """Return the points outside the solid that water from the border does not reach."""
@@ -218,6 +239,22 @@ class Sparse:
         place = (self.origin, self.size, 0)
         return int(compiled.turn_inside(fine, triangles, place, self.blocks, self.table))
 
+    def turn_wound(self, values: Singles, tree: FaceTree) -> None:
+        """Negate values as `Dense` does; the corners of cells are the points farther away."""
+        side = SIDE * self.size
+        places = self.origin + side * np.indices(self.counts).reshape(3, -1).T
+        wound = (np.abs(tree.windings(places)) >= 0.5).reshape(self.counts)
+        inside = np.zeros(len(values), dtype=bool)
+        corners, fine = self._parts(inside)
+        corners[:] = wound
+        shape = fine.reshape(-1, SIDE, SIDE, SIDE)
+        for offset in np.ndindex(2, 2, 2):
+            nearest = tuple(slice(SIDE // 2, None) if o else slice(None, SIDE // 2) for o in offset)
+            shape[(slice(None), *nearest)] = wound[tuple((self.blocks + offset).T)][
+                :, None, None, None
+            ]
+        _turn_near(self, values, inside, tree, side)
+
     def unreached(self, values: Singles) -> Bools:
         """Return unreached points as `Dense` does."""
         water = values > 0.0
@@ -305,6 +342,15 @@ def sparse_near(
 
 Lattice = Dense | Sparse
 """Points at which a grid is built, in one row."""
+
+
+def _turn_near(
+    lattice: Lattice, values: Singles, inside: Bools, tree: FaceTree, step: float
+) -> None:
+    """Negate values inside; near faces, within half a diagonal of `step`, by the tree itself."""
+    places, which = lattice.positions(np.abs(values) <= 0.5 * math.sqrt(3.0) * step)
+    inside[which] = np.abs(tree.windings(places)) >= 0.5
+    values[inside] = -np.abs(values[inside])
 
 
 def report_stage(on_progress: OnStage, stage: str, fraction: float) -> None:

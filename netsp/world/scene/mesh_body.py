@@ -2,12 +2,14 @@
 
 Many meshes are open, inside out, or soups of faces. Closed parts bound solids. An
 open part does, too, if its winding number just behind its faces is nearly 1: its holes are small,
-and flat fans close them. All other faces are sheets.
+and flat fans close them. Faces whose edges do not meet may still enclose a solid together; if so,
+their winding number is nearly 1 behind them, and it decides what is inside. All other faces are
+sheets.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -43,6 +45,9 @@ class MeshBody:
         Defects of the mesh and what was made of them, one line each.
     thickness : float, optional
         Thickness of sheets and of parts that no voxel shows, metres; None for four voxels.
+    loose : ndarray, shape (j, 3)
+        Faces about a solid whose edges do not meet, normals outwards. A place is inside where their
+        winding number is 0.5 or more.
     """
 
     vertices: Floats
@@ -52,6 +57,21 @@ class MeshBody:
     turned: int
     notes: tuple[str, ...]
     thickness: float | None = None
+    loose: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+
+    @property
+    def triangles(self) -> Floats:
+        """Triangles (n, 3, 3) of all faces, with the fans that close holes."""
+        return np.asarray(self.vertices[np.concatenate([self.solid, self.loose, self.sheet])])
+
+    def holds(self, places: Floats) -> Bools:
+        """Return whether places (n, 3) lie inside the solid, by its winding numbers."""
+        inside = np.zeros(len(places), dtype=bool)
+        for faces in (self.solid, self.loose):
+            if len(faces) and len(places):
+                tree = FaceTree.build(self.vertices[faces])
+                inside |= np.abs(tree.windings(places)) >= 0.5
+        return inside
 
 
 def body_of_mesh(
@@ -109,6 +129,8 @@ class _Builder:
         self.notes: list[str] = []
         self.solid: list[Ints] = []
         self.sheet: list[Ints] = []
+        self.sheet_rows: list[Ints] = []
+        self.loose: Ints = faces[:0]
         self.fans: list[Ints] = []
         self.apexes: list[Floats] = []
         self.turned = 0
@@ -126,8 +148,9 @@ class _Builder:
             faces, self.turned = outward_parts(self.faces[closed], part[closed], self.vertices)
             self.solid.append(faces)
         if not closed.all():
-            solid_parts, sheet_parts = self._open_parts(part, np.flatnonzero(~is_closed))
-            self._note_open(share, edge_count, solid_parts, sheet_parts)
+            solid_parts = self._open_parts(part, np.flatnonzero(~is_closed))
+            loose_parts = self._loose_solid(part)
+            self._note_open(share, edge_count, (solid_parts, loose_parts, len(self.sheet)))
         none = self.faces[:0]
         fans = np.vstack(self.fans) if self.fans else none
         vertices = np.vstack([self.vertices, *self.apexes]) if self.apexes else self.vertices
@@ -139,6 +162,7 @@ class _Builder:
             np.vstack([none, *self.sheet]),
             self.turned,
             tuple(self.notes),
+            loose=self.loose,
         )
 
     def _boundary(self) -> tuple[float, int]:
@@ -196,11 +220,11 @@ class _Builder:
         is_even = (edges.uses % 2 == 0) & (edges.balance == 0)
         return np.asarray(np.bincount(owner, ~is_even, minlength=count) == 0)
 
-    def _open_parts(self, part: Ints, numbers: Ints) -> tuple[int, int]:
-        """Sort open parts into solids and sheets; return the numbers of both."""
+    def _open_parts(self, part: Ints, numbers: Ints) -> int:
+        """Sort open parts into solids and sheets; return the number of solids."""
         order = np.argsort(part, kind="stable")
         begin = np.searchsorted(part[order], np.arange(int(part.max()) + 2))
-        counts = np.zeros(2, dtype=int)
+        count = 0
         for number in numbers.tolist():
             rows = order[begin[number] : begin[number + 1]]
             end_if_abandoned()
@@ -209,8 +233,40 @@ class _Builder:
                 is_solid = self._close(rows)
             if not is_solid:
                 self.sheet.append(self.faces[rows])
-            counts[0 if is_solid else 1] += 1
-        return int(counts[0]), int(counts[1])
+                self.sheet_rows.append(rows)
+            count += is_solid
+        return count
+
+    def _loose_solid(self, part: Ints) -> int:
+        """Take sheets that enclose a solid together as its surface; return how many parts."""
+        if self.surface == "sheet" or len(self.sheet) < 2:
+            return 0
+        rows = np.concatenate(self.sheet_rows)
+        piece, turn, one_sided = pieces_of(self.welded_faces[rows])
+        if one_sided.any():
+            return 0
+        faces = np.where(turn[:, None], self.faces[rows][:, ::-1], self.faces[rows])
+        is_inward = facing_inward(self.vertices[faces], piece, self.policy)
+        faces = np.where(is_inward[:, None], faces[:, ::-1], faces)
+        triangles = self.vertices[faces]
+        front, behind = _sides(triangles, self.policy)
+        likely = FaceTree.build(triangles).windings(behind) >= self.policy.min_loose_winding
+        if likely.sum() < self.policy.min_solid_faces:
+            return 0
+        if self.surface is None:
+            doubt = winding_doubt(triangles[likely], self.policy)
+            if doubt > 1.0 - self.policy.min_closedness:
+                return 0
+        tree = FaceTree.build(triangles[likely])
+        is_solid_behind, is_solid_before = tree.windings(behind) >= 0.5, tree.windings(front) >= 0.5
+        is_bound = likely | (is_solid_behind & ~is_solid_before)
+        is_buried = ~is_bound & is_solid_behind & is_solid_before
+        if is_buried.any():
+            self.notes.append(f"{counted(int(is_buried.sum()), 'face')} lie in the solid: left out")
+        self.loose = faces[is_bound]
+        before, kept = len(self.sheet), rows[~is_bound & ~is_buried]
+        self.sheet = [self.faces[kept[part[kept] == k]] for k in np.unique(part[kept])]
+        return before - len(self.sheet)
 
     def _close(self, rows: Ints) -> bool:
         """Close the holes of an open part if it bounds a solid; return whether it does."""
@@ -243,14 +299,20 @@ class _Builder:
             fan = np.column_stack([corners, np.roll(corners, -1), np.full(len(corners), apex)])
             self.fans.append(fan)
 
-    def _note_open(self, share: float, edges: int, solids: int, sheets: int) -> None:
-        """Note what was made of open parts."""
-        made = []
+    def _note_open(self, share: float, edges: int, counts: tuple[int, int, int]) -> None:
+        """Note what was made of open parts: the numbers of solid, loose and sheet ones."""
+        made, (solids, loose, sheets) = [], counts
         if solids:
             made.append(f"{counted(solids, 'part')} taken as solid")
             if self.holes:
                 widest = max(self.holes)
                 made[0] += f", {counted(len(self.holes), 'hole')} closed, the widest {widest:.3g}"
+        if loose:
+            part = len(self.loose) / len(self.faces)
+            made.append(
+                f"{counted(loose, 'part')} ({percent(part)} of its faces) taken together as solid "
+                "by the winding number"
+            )
         if sheets:
             part = sum(len(f) for f in self.sheet) / len(self.faces)
             made.append(
@@ -320,6 +382,19 @@ def closedness(triangles: Floats, policy: MeshPolicy) -> float:
     _, behind = _sides(triangles[chosen], policy)
     areas = _areas(triangles[chosen])
     return float(np.average(tree.windings(behind), weights=areas))
+
+
+def winding_doubt(triangles: Floats, policy: MeshPolicy) -> float:
+    """Return how far winding numbers beside triangles (m, 3, 3) are from whole ones on average.
+
+    0 for closed surfaces, even if they overlap; about 0.25 for random triangles, and 0.5 for a
+    flat sheet.
+    """
+    tree = FaceTree.build(triangles)
+    chosen = _samples(triangles, policy.samples)
+    around = np.array([tree.windings(side) for side in _sides(triangles[chosen], policy)])
+    far = np.abs(around - np.rint(around)).mean(axis=0)
+    return float(np.average(far, weights=_areas(triangles[chosen])))
 
 
 def sphere_points(count: int) -> Floats:

@@ -28,6 +28,8 @@ class GridPolicy:
     sheet_voxels
         Half thickness of surfaces without an inside, voxels. With one voxel, interpolation would
         round both sides into one, and lengths of tethers would depend on their resolution.
+    max_hidden_share
+        Share of the sides of sheets within the thickness of others from which on a note says so.
     block_reach
         Distance of a corner from a surface, in sides of a cell, up to which the cell is a block.
     inside_block_reach
@@ -57,6 +59,7 @@ class GridPolicy:
     border_voxels: int = 8
     border_cells: int = 4
     sheet_voxels: float = 2.0
+    max_hidden_share: float = 0.01
     block_reach: float = 1.25
     inside_block_reach: float = 0.9
     halo_cells: int = 2
@@ -100,6 +103,10 @@ class MeshPolicy:
         holes. At 0.95 about a tenth of a ball may be missing; a box without a lid is a sheet.
     min_solid_faces
         Smallest number of faces of an open part that may be a solid.
+    min_loose_winding
+        Smallest winding number just behind a face whose edges do not meet those of others, for it
+        to be a candidate for the surface of a solid. It is about 1 where such faces enclose one,
+        and 0.5 behind a face on its own.
     min_extent_m, max_extent_m
         Sizes of a mesh, metres, outside of which a note doubts its unit.
     min_allowed_extent_m, max_allowed_extent_m
@@ -112,6 +119,7 @@ class MeshPolicy:
     rays: int = 32
     min_closedness: float = 0.95
     min_solid_faces: int = 4
+    min_loose_winding: float = 0.75
     min_extent_m: float = 0.2
     max_extent_m: float = 250.0
     min_allowed_extent_m: float = 0.01

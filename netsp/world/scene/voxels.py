@@ -68,10 +68,10 @@ def grid_of_bodies(
     shell = _shell(thickness, size, source, policy)
     sized_by = thickness if voxel is None else None
     place = _Place(mesh.low, mesh.high, size, memory_limit, source, sized_by)
-    triangles = None if mesh.has_sheet else mesh.solid
+    triangles = None if mesh.has_sheet or len(mesh.loose) else mesh.solid
     half = shell / size if mesh.has_sheet else 0.0
     lattice = _lattice(place, mesh.sites, policy, shell=half, triangles=triangles, region=region)
-    values, notes, grow = mesh.values(lattice, on_progress, source, shell)
+    values, notes, grow = mesh.values(lattice, on_progress, source, shell, policy.max_hidden_share)
     report_stage(on_progress, "distances", 1.0)
     box = np.array([mesh.low - grow, mesh.high + grow])
     return lattice.grid(values, box, tuple(notes))
@@ -119,10 +119,12 @@ def grid_of_triangles(
 
 @dataclass
 class _Triangles:
-    """Triangles (m, 3, 3) about solids and of sheets, their sites, the corners (3,) of their box,
-    and the number of parts that were inside out."""
+    """Triangles (m, 3, 3) about solids, about solids whose edges do not meet, and of sheets, their
+    sites in this order, the corners (3,) of their box, and the number of parts that were inside
+    out."""
 
     solid: Floats
+    loose: Floats
     sheet: Floats
     sites: Floats
     low: Floats
@@ -134,9 +136,16 @@ class _Triangles:
         solid = np.concatenate([b.vertices[b.solid] for b in bodies])
         sheet = np.concatenate([b.vertices[b.sheet] for b in bodies])
         end_if_abandoned()
-        both = np.concatenate([solid, sheet])
+        loose = np.concatenate([b.vertices[b.loose] for b in bodies])
+        every = np.concatenate([solid, loose, sheet])
         turned = sum(b.turned for b in bodies)
-        return cls(solid, sheet, triangle_sites(both), both.min((0, 1)), both.max((0, 1)), turned)
+        low, high = every.min((0, 1)), every.max((0, 1))
+        return cls(solid, loose, sheet, triangle_sites(every), low, high, turned)
+
+    @property
+    def surface(self) -> Floats:
+        """Triangles about solids."""
+        return np.concatenate([self.solid, self.loose]) if len(self.loose) else self.solid
 
     @property
     def has_sheet(self) -> bool:
@@ -144,7 +153,12 @@ class _Triangles:
         return len(self.sheet) > 0
 
     def values(
-        self, lattice: Lattice, on_progress: OnStage, source: str, shell: float
+        self,
+        lattice: Lattice,
+        on_progress: OnStage,
+        source: str,
+        shell: float,
+        max_hidden_share: float,
     ) -> tuple[Singles, list[str], float]:
         """Return the signed distances at the points of a lattice, notes on what was assumed, and
         growth beyond the triangles' box, metres."""
@@ -152,25 +166,26 @@ class _Triangles:
         _check_voxel("mesh", size, self.low, self.high, source)
         values = lattice.closest(self.sites, on_progress, with_owners=False)[0]
         grow = 0.0
-        if not len(self.solid):
+        surface = self.surface
+        if not len(surface):
             self._check_shell(shell, size, source)
             values -= np.float32(shell)
             grow = shell
         else:
-            sheet = self.sites[len(self.solid) :]
+            sheet = self.sites[len(surface) :]
             if len(sheet):
-                solid_sites = self.sites[: len(self.solid)]
+                solid_sites = self.sites[: len(surface)]
                 values = lattice.closest(solid_sites, None, with_owners=False)[0]
             notes += self._turn_inside(lattice, values)
             thin = self._thin(lattice, values)
             if thin.any():
-                share = float(_double_areas(self.solid[thin]).sum())
-                share /= float(_double_areas(self.solid).sum())
+                share = float(_double_areas(surface[thin]).sum())
+                share /= float(_double_areas(surface).sum())
                 notes.append(
                     f"{percent(share)} of the surface is of parts thinner than a voxel of "
                     f"{size:.3g}: made {2 * shell:.3g} thick; smaller voxels show them as they are"
                 )
-                sheet = np.concatenate([sheet, self.sites[: len(self.solid)][thin]])
+                sheet = np.concatenate([sheet, self.sites[: len(surface)][thin]])
             if len(sheet):
                 self._check_shell(shell, size, source)
                 near = lattice.closest(sheet, None, with_owners=False)[0]
@@ -178,12 +193,31 @@ class _Triangles:
                 grow = shell
         if self.has_sheet:
             notes.append(f"sheets are {2 * shell:.3g} thick")
+            share = self._hidden_share(lattice, values, shell)
+            if share > max_hidden_share:
+                notes.append(
+                    f"{percent(share)} of the sides of sheets lie within the thickness of others: "
+                    f"hidden from cameras; voxels smaller than {size:.3g} show more of them"
+                )
         end_if_abandoned()
         enclosed = lattice.unreached(values)
         if enclosed.any():
             values[enclosed] = -np.abs(values[enclosed])
             notes.append("closed cavities count as solid")
         return values, notes, grow
+
+    def _hidden_share(self, lattice: Lattice, values: Singles, shell: float) -> float:
+        """Return the share of the area of the sides of sheets that lies in something solid."""
+        normals = np.cross(self.sheet[:, 1] - self.sheet[:, 0], self.sheet[:, 2] - self.sheet[:, 0])
+        double_areas = np.linalg.norm(normals, axis=1)
+        normals /= np.maximum(double_areas, 1e-300)[:, None]
+        hidden = 0.0
+        for weights in _SPREAD:
+            places = np.einsum("k,mkd->md", weights, self.sheet)
+            for side in (shell + lattice.size, -shell - lattice.size):
+                at = places + side * normals
+                hidden += float(double_areas[lattice.minimum_nearby(values, at, 0) < 0.0].sum())
+        return hidden / (2.0 * len(_SPREAD) * float(double_areas.sum()))
 
     def _check_shell(self, shell: float, size: float, source: str) -> None:
         """Raise InputError if sheets are thicker than the mesh is across."""
@@ -197,7 +231,9 @@ class _Triangles:
 
     def _turn_inside(self, lattice: Lattice, values: Singles) -> list[str]:
         """Negate the values inside the solid; return notes on its parts."""
-        max_winding = lattice.turn_inside(values, self.solid)
+        max_winding = lattice.turn_inside(values, self.solid) if len(self.solid) else 0
+        if len(self.loose):
+            lattice.turn_wound(values, FaceTree.build(self.loose))
         if self.turned:
             return [f"{self.turned} parts are inside out, or cavities: taken as solid"]
         return ["parts of the mesh overlap: taken as their union"] if max_winding > 1 else []
@@ -205,24 +241,29 @@ class _Triangles:
     def _thin(self, lattice: Lattice, values: Singles) -> Bools:
         """Return which triangles (m,) about the solid are the faces of parts thinner than a
         voxel."""
-        thin = np.zeros(len(self.solid), dtype=bool)
-        normals = np.cross(self.solid[:, 1] - self.solid[:, 0], self.solid[:, 2] - self.solid[:, 0])
+        surface = self.surface
+        thin = np.zeros(len(surface), dtype=bool)
+        normals = np.cross(surface[:, 1] - surface[:, 0], surface[:, 2] - surface[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         off = 1e-3 * lattice.size
         tree: FaceTree | None = None
         for weights in _TRIED:
-            places = np.einsum("k,mkd->md", weights, self.solid)
+            places = np.einsum("k,mkd->md", weights, surface)
             lowest = lattice.minimum_nearby(values, places, 1)
             thin |= lowest > 0.0
             # behind a flat face of a thick part, some point is half a voxel deep
             shallow = np.flatnonzero(~thin & (lowest > -0.5 * lattice.size))
             if len(shallow):
-                tree = tree or FaceTree.build(self.solid)
+                tree = tree or FaceTree.build(surface)
                 inwards = -normals[shallow]
                 lengths = tree.ray_lengths(places[shallow] + off * inwards, inwards)
                 thin[shallow[lengths < lattice.size]] = True
         return thin
 
+
+_SPREAD = np.array([[i, j, 7 - i - j] for i in range(1, 6) for j in range(1, 7 - i)]) / 7.0
+"""Places spread over a triangle at which the sides of sheets are looked at, by weights of its
+corners."""
 
 _TRIED = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
 """Tolerance of the search for thin parts: the places of a triangle, by weights of its corners."""
@@ -425,7 +466,9 @@ def grid_of_bodies_and_cloud(
         extra=extra,
         has_cloud=True,
     )
-    values, notes, mesh_grow = mesh.values(lattice, on_progress, source, shell)
+    values, notes, mesh_grow = mesh.values(
+        lattice, on_progress, source, shell, policy.max_hidden_share
+    )
     cloud, cloud_notes, grow = _cloud_values(
         lattice, p, point_sites(p), _ball(p, size), None, source, policy.sheet_voxels
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
-from netsp.world.scene.face_tree import FaceTree
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.mesh_body import MeshBody
 from netsp.world.scene.scene_policy import MeshPolicy
@@ -17,15 +16,8 @@ def facing_triangles(body: MeshBody) -> Floats:
     A sheet has two, one for each side; fans that close holes have none.
     """
     solid = body.vertices[body.solid[: len(body.solid) - body.fans]]
-    sheet = body.vertices[body.sheet]
-    return np.concatenate([solid, sheet, sheet[:, ::-1]])
-
-
-def in_solid(body: MeshBody, places: Floats) -> Bools:
-    """Return whether places (n, 3) lie inside the solid of a body, by its winding number."""
-    if not len(body.solid) or not len(places):
-        return np.zeros(len(places), dtype=bool)
-    return np.abs(FaceTree.build(body.vertices[body.solid]).windings(places)) >= 0.5
+    loose, sheet = body.vertices[body.loose], body.vertices[body.sheet]
+    return np.concatenate([solid, loose, sheet, sheet[:, ::-1]])
 
 
 def unit_normals(triangles: Floats) -> Floats:
@@ -72,7 +64,7 @@ def mesh_patches(
     doubtful = np.flatnonzero(below[first])
     diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
     before = MeshPolicy().side_share * diagonal * normals[chosen[doubtful]]
-    buried[doubtful] = in_solid(body, middles[chosen[doubtful]] + before)
+    buried[doubtful] = body.holds(middles[chosen[doubtful]] + before)
     return places[chosen[~buried]], normals[chosen[~buried]], summed[~buried]
 
 

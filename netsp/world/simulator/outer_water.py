@@ -117,7 +117,7 @@ def exposed(
     policy : CoveragePolicy
         Rays from each patch.
     """
-    tree = FaceTree.build(np.concatenate([body.vertices[body.solid], body.vertices[body.sheet]]))
+    tree = FaceTree.build(body.triangles)
     starts = centres + off * normals
     first = max(clearance, water.size)
     steps = first * policy.sight_growth ** np.arange(policy.sight_steps)
