@@ -1,8 +1,9 @@
 """Judge of runs in space by other means than netsp's.
 
 The judge takes from a run only where the robot was at which time, and when the surprises happened.
-It lays a string of its own along the robot's path (`taut_string.py`) and measures distances to the
-solids of the true scene in closed form. For waypoints that were not visited, the judge searches the
+It lays strings of its own along the robot's path (`taut_string.py`) and measures distances to the
+solids of the true scene in closed form. There are several strings, because one may catch at a
+corner where a tether slips. For waypoints that were not visited, the judge searches the
 shortest tether in the final scene through a graph of cells, and pulls it taut with the same string.
 """
 
@@ -14,14 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from flight_store import FlownStep
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
-from taut_string import TautString, is_free, packed, rooms
+from taut_string import StringBundle, is_free, packed, rooms
 
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
-from netsp.world.mission.run_log import LogRow
 from netsp.world.simulator.surprises import SceneEvent
 
 
@@ -44,6 +45,9 @@ class JudgeOptions:
     appear_depth
         Depth of the string in a solid that appears at which the side of the string is not known,
         metres.
+    agreement
+        Excess of a string over the tether of the log from which on other strings are tried, too, as
+        a share of the limit. This saves time only: other strings count where they are shorter.
     detours
         Number of searches of a shortest tether with random weights of the cells, after the first.
     """
@@ -54,6 +58,7 @@ class JudgeOptions:
     late_s: float = 15.0
     margin: float = 0.004
     appear_depth: float = 0.2
+    agreement: float = 0.002
     detours: int = 3
 
 
@@ -134,7 +139,7 @@ def anchor_line(mission: Mission, since: float, until: float) -> np.ndarray:
 def judge_run(
     mission: Mission,
     scene: Scene,
-    log: Sequence[LogRow],
+    log: Sequence[FlownStep],
     happened: Sequence[tuple[float, SceneEvent]],
     reserve: float,
     options: JudgeOptions = JudgeOptions(),
@@ -147,7 +152,7 @@ def judge_run(
         Mission as it was given.
     scene : Scene
         True scene at 0 s, without the events.
-    log : sequence of LogRow
+    log : sequence of FlownStep
         Only times and positions are used, and the lengths for `difference`.
     happened : sequence of (float, SceneEvent)
         Times, s, and events, in their order.
@@ -159,7 +164,7 @@ def judge_run(
     places = [np.array(w.position) for w in mission.waypoints]
     cancelled: set[int] = set()
     start = np.array([log[0].x, log[0].y, log[0].z])
-    string = TautString(rows, corners, np.array([mission.anchor, start]))
+    string = StringBundle(rows, corners, np.array([mission.anchor, start]))
     limit, lowered_until, now, before = mission.tether_length, -math.inf, 0.0, start
     seen: set[int] = set()
     for n, row in enumerate(log):
@@ -191,7 +196,8 @@ def judge_run(
                     verdict.faults.append(f"a solid came upon the string at {row.time:g} s")
         seen |= {k for k, p in enumerate(places) if np.linalg.norm(p - place) <= mission.reach}
         if n % options.rows == 0 or n == len(log) - 1 or string.length > limit:
-            string.relax(is_quick=string.length <= limit)
+            enough = min(limit, row.tether + options.agreement * limit)
+            string.relax(string.length <= limit, enough)
             gap = abs(string.length - row.tether) / limit
             verdict.difference = max(verdict.difference, gap)
         if string.length <= limit:
@@ -216,10 +222,10 @@ def judge_run(
 
 
 def _judge_end(
-    verdict: Verdict, mission: Mission, string: TautString, now: float, free_m: float
+    verdict: Verdict, mission: Mission, string: StringBundle, now: float, free_m: float
 ) -> None:
     """Judge whether the robot is home, with a free tether."""
-    anchor, robot = anchor_at(mission, now), string.nodes[string.count - 1]
+    anchor, robot = anchor_at(mission, now), string.end
     home = anchor + np.array(mission.start) - np.array(mission.anchor)
     distance = float(np.linalg.norm(robot - home))
     if mission.track:
@@ -354,7 +360,7 @@ class CellGraph:
             if end != begin:
                 return math.inf
             points = np.array([*line, anchor])[::-1]
-            string = TautString(self.rows, self.corners, points)
+            string = StringBundle(self.rows, self.corners, points)
             string.relax()
             best = min(best, string.length)
             if best <= stop:

@@ -1,7 +1,8 @@
 """Taut string among solids, by other means than the tether of netsp.
 
 Distances to solids are measured in closed form. The string is shortened across triangles that balls
-of free water cover, and by small moves along surfaces, so it stays in its class.
+of free water cover, and by small moves that sweep free water only, so it stays in its class. It may
+catch at corners where it should slip, and is too long then: of several, the shortest counts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ CAPSULE, CYLINDER, BOX, TORUS, POST, PRISM, HALF_SPACE = range(7)
 WIDTH = 16
 """Numbers of a solid's row: its kind, and up to 15 parameters."""
 
-GRAIN = 0.03
+GRAIN = 0.012
 """Radius of the pieces of a triangle of which only the centre is tested, metres; far below the
 thinnest solid."""
 
@@ -38,10 +39,17 @@ class StringOptions:
     ----------
     dip
         Depth to which the string may cut into a solid between its nodes, metres.
+    cut
+        Depth to which a segment of nodes that slide along a surface may cut into a solid, metres.
+    is_mixed
+        Whether nodes slide with twice this depth, too.
+    slack
+        Depth to which a move of nodes may cut into a solid, metres; far below the thinnest solid,
+        and more than the chords of nodes on a curved surface cut into it.
     fine
         Distance between nodes at contacts, metres.
     reach
-        Largest move of a node in one sweep, metres; less than half the thinnest solid.
+        Largest move of a node in one sweep, metres.
     slide
         Largest move of a group of nodes along a surface, metres.
     sweeps
@@ -53,7 +61,10 @@ class StringOptions:
     """
 
     dip: float = 0.005
-    fine: float = 0.08
+    cut: float = 0.01
+    is_mixed: bool = False
+    slack: float = 0.03
+    fine: float = 0.06
     reach: float = 0.08
     slide: float = 0.8
     sweeps: int = 8
@@ -314,9 +325,9 @@ def _refined(rows, corners, nodes, count, fine):
 
 
 @numba.njit(cache=True)
-def _smooth(rows, corners, nodes, count, sweeps, reach):
+def _smooth(rows, corners, nodes, count, sweeps, reach, cut, slack):
     """Move nodes, one by one, towards the lines between their neighbours and out of solids, by at
-    most `reach`, if this shortens the string."""
+    most `reach`, if this shortens the string and sweeps free water only."""
     for sweep in range(sweeps):
         for step in range(1, count - 1):
             i = step if sweep % 2 == 0 else count - 1 - step
@@ -329,30 +340,28 @@ def _smooth(rows, corners, nodes, count, sweeps, reach):
             far = math.sqrt(np.dot(way, way))
             if far < 1e-7:
                 continue
-            for factor in (1.6, 1.0):
-                share = min(factor, reach / far)
+            for factor in (1.6, 1.0, 0.4):
+                share = min(factor, factor * reach / far)
                 q = _outside(rows, corners, b + share * way)
                 if (
                     _room(rows, corners, q[0], q[1], q[2]) >= -1e-3
                     and _distance(a, q) + _distance(q, c) < old - 1e-9
+                    and is_free(rows, corners, a, q, 0.5 * (a + q), cut)
+                    and is_free(rows, corners, q, c, 0.5 * (q + c), cut)
+                    and is_free(rows, corners, a, b, q, slack)
+                    and is_free(rows, corners, b, q, c, slack)
                 ):
                     nodes[i] = q
                     break
 
 
 @numba.njit(cache=True)
-def _slide(rows, corners, nodes, begin, end, slack, reach):
-    """Slide the nodes from `begin` to `end` as a whole where their neighbours pull them, by at most
-    `reach`, if this shortens the string and sweeps free water only; return whether it did."""
-    pull = np.zeros(3)
-    for inner, outer in ((begin, begin - 1), (end, end + 1)):
-        far = _distance(nodes[inner], nodes[outer])
-        if far > 0.0:
-            pull += (nodes[outer] - nodes[inner]) / far
-    # along the surfaces that the nodes touch
+def _along_surfaces(rows, corners, nodes, begin, end, pull, touch):
+    """Return the part of a pull that is along the surfaces nearer than `touch` to the nodes from
+    `begin` to `end`; two surfaces at most, or else nothing is left."""
     normals, count = np.empty((2, 3)), 0
     for i in range(begin, end + 1):
-        if _room(rows, corners, nodes[i, 0], nodes[i, 1], nodes[i, 2]) > 0.02:
+        if _room(rows, corners, nodes[i, 0], nodes[i, 1], nodes[i, 2]) > touch:
             continue
         normal = _gradient(rows, corners, nodes[i])
         for k in range(count):
@@ -360,46 +369,61 @@ def _slide(rows, corners, nodes, begin, end, slack, reach):
         size = math.sqrt(np.dot(normal, normal))
         if size > 0.3:
             if count == 2:
-                return False
+                return np.zeros(3)
             normals[count] = normal / size
             count += 1
+    out = pull.copy()
     for k in range(count):
-        pull -= np.dot(pull, normals[k]) * normals[k]
-    norm = math.sqrt(np.dot(pull, pull))
-    if norm < 1e-3:
-        return False
+        out -= np.dot(out, normals[k]) * normals[k]
+    return out
+
+
+@numba.njit(cache=True)
+def _slide(rows, corners, nodes, begin, end, cut, slack, reach):
+    """Slide the nodes from `begin` to `end` as a whole where their neighbours pull them, by at most
+    `reach`, if this shortens the string and sweeps free water only; return whether it did."""
+    pull = np.zeros(3)
+    for inner, outer in ((begin, begin - 1), (end, end + 1)):
+        far = _distance(nodes[inner], nodes[outer])
+        if far > 0.0:
+            pull += (nodes[outer] - nodes[inner]) / far
     total = end - begin + 3
     old, new = nodes[begin - 1 : end + 2].copy(), nodes[begin - 1 : end + 2].copy()
     length = _length(old, total)
-    while reach > 0.01:
-        for k in range(1, total - 1):
-            new[k] = _outside(rows, corners, old[k] + reach / norm * pull)
-        if _length(new, total) < length - 1e-4:
-            free = True
-            for k in range(total - 1):
-                free = (
-                    free
-                    and _room(rows, corners, new[k, 0], new[k, 1], new[k, 2]) >= -1e-3
-                    and is_free(rows, corners, old[k], old[k + 1], new[k + 1], slack)
-                    and is_free(rows, corners, old[k], new[k], new[k + 1], slack)
-                )
-            if free:
-                nodes[begin - 1 : end + 2] = new
-                return True
-        reach *= 0.4
+    for touch in (0.02, 0.12):
+        way = _along_surfaces(rows, corners, nodes, begin, end, pull, touch)
+        norm, step = math.sqrt(np.dot(way, way)), reach
+        while norm >= 1e-3 and step > 0.01:
+            for k in range(1, total - 1):
+                new[k] = _outside(rows, corners, old[k] + step / norm * way)
+            if _length(new, total) < length - 1e-4:
+                free = True
+                for k in range(total - 1):
+                    middle = 0.5 * (new[k] + new[k + 1])
+                    free = (
+                        free
+                        and _room(rows, corners, new[k, 0], new[k, 1], new[k, 2]) >= -1e-3
+                        and is_free(rows, corners, new[k], new[k + 1], middle, cut)
+                        and is_free(rows, corners, old[k], old[k + 1], new[k + 1], slack)
+                        and is_free(rows, corners, old[k], new[k], new[k + 1], slack)
+                    )
+                if free:
+                    nodes[begin - 1 : end + 2] = new
+                    return True
+            step *= 0.4
     return False
 
 
 @numba.njit(cache=True)
-def _slide_groups(rows, corners, nodes, count, slack, reach):
-    """Slide each group of nodes that are nearer to one another than `reach`."""
+def _slide_groups(rows, corners, nodes, count, cut, slack, gap, reach):
+    """Slide each group of nodes that are nearer to one another than `gap`."""
     begin = 1
     while begin < count - 1:
         end = begin
-        while end < count - 2 and _distance(nodes[end], nodes[end + 1]) < reach:
+        while end < count - 2 and _distance(nodes[end], nodes[end + 1]) < gap:
             end += 1
         for _ in range(6):
-            if not _slide(rows, corners, nodes, begin, end, slack, reach):
+            if not _slide(rows, corners, nodes, begin, end, cut, slack, reach):
                 break
         begin = end + 1
 
@@ -417,18 +441,36 @@ def _near(rows, corners, nodes, count, room):
 
 
 @numba.njit(cache=True)
-def _relaxed(rows, corners, nodes, count, dip, fine, reach, slide, sweeps, rounds, least):
+def _relaxed(
+    rows,
+    corners,
+    nodes,
+    count,
+    dip,
+    cut,
+    is_mixed,
+    slack,
+    fine,
+    reach,
+    slide,
+    sweeps,
+    rounds,
+    least,
+):
     """Shorten a string in place; return the number of its nodes."""
     count = _shortcut(rows, corners, nodes, count, dip)
     length = _length(nodes, count)
     for n in range(rounds):
         if count == 2:
             break
-        _slide_groups(rows, corners, nodes, count, 0.6 * fine, slide)
+        for gap in (slide, 3.0 * fine):
+            _slide_groups(rows, corners, nodes, count, cut, slack, gap, slide)
+            if is_mixed:
+                _slide_groups(rows, corners, nodes, count, 2.0 * cut, slack, gap, slide)
         dense, many = _refined(rows, corners, nodes, count, fine)
         # no node moves farther than this
         near = _near(rows, corners, dense, many, (1.0 + sweeps) * reach)
-        _smooth(near, corners, dense, many, sweeps, reach)
+        _smooth(near, corners, dense, many, sweeps, reach, 2.0 * dip, slack)
         if n % 2:
             many = _shortcut(rows, corners, dense, many, dip)
         else:
@@ -472,8 +514,8 @@ class TautString:
         """Shorten the string."""
         o = self.options
         self.count = _relaxed(
-            self.rows, self.corners, self.nodes, self.count, o.dip, o.fine, o.reach, o.slide,
-            o.sweeps, o.quick_rounds if is_quick else o.rounds,
+            self.rows, self.corners, self.nodes, self.count, o.dip, o.cut, o.is_mixed, o.slack,
+            o.fine, o.reach, o.slide, o.sweeps, o.quick_rounds if is_quick else o.rounds,
             o.quick_least if is_quick else o.least,
         )  # fmt: skip
 
@@ -509,6 +551,74 @@ class TautString:
         self.nodes[: len(points)], self.count = points, len(points)
         self.relax()
         return depth
+
+
+VARIANTS = (
+    StringOptions(),
+    StringOptions(cut=0.02),
+    StringOptions(is_mixed=True),
+    StringOptions(cut=0.02, fine=0.08),
+)
+"""Options of the strings of a bundle."""
+
+
+class StringBundle:
+    """Strings of one class that are shortened in different ways; the shortest of them counts.
+
+    A string may catch at a corner where it should slip, and is then too long. It takes the place of
+    the shortest one when it is longer by more than `max_excess`.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, 3)
+        Line along which the strings lie at first, metres.
+    max_excess : float
+        Largest excess over the shortest string, metres.
+    """
+
+    def __init__(
+        self, rows: np.ndarray, corners: np.ndarray, points: np.ndarray, max_excess: float = 0.02
+    ) -> None:
+        self.strings = [TautString(rows, corners, points, options) for options in VARIANTS]
+        self.max_excess = max_excess
+
+    @property
+    def length(self) -> float:
+        """Length of the shortest string, metres."""
+        return min(string.length for string in self.strings)
+
+    @property
+    def end(self) -> np.ndarray:
+        """End (3,), metres."""
+        first = self.strings[0]
+        return first.nodes[first.count - 1].copy()
+
+    def relax(self, is_quick: bool = False, enough: float = -math.inf) -> None:
+        """Shorten the first string, and the others if it stays longer than `enough`, metres."""
+        self.strings[0].relax(is_quick)
+        if self.strings[0].length <= enough:
+            return
+        for string in self.strings[1:]:
+            string.relax(is_quick)
+        best = min(self.strings, key=lambda string: string.length)
+        for string in self.strings:
+            if string.length > best.length + self.max_excess:
+                string.nodes[: best.count], string.count = best.nodes[: best.count], best.count
+
+    def move_end(self, place: np.ndarray) -> None:
+        """See `TautString`."""
+        for string in self.strings:
+            string.move_end(place)
+
+    def move_anchor(self, places: np.ndarray) -> None:
+        """See `TautString`."""
+        for string in self.strings:
+            string.move_anchor(places)
+
+    def change_scene(self, rows: np.ndarray, corners: np.ndarray) -> float:
+        """See `TautString`; return the depth of the shortest string."""
+        best = min(self.strings, key=lambda string: string.length)
+        return [s.change_scene(rows, corners) for s in self.strings][self.strings.index(best)]
 
 
 def main() -> None:

@@ -6,24 +6,26 @@ Four kinds: the anchor moves on a random track; a range sensor finds solids that
 reported surprises of every kind; and a planned tour that is repaired after such surprises, half of
 the time found by a range sensor. The runs of a kind go over twelve scenes in turn, with 8 to 10
 waypoints each and a limit of 0.95 to 1.4 times the longest of the shortest tethers, so that some
-waypoints are out of reach. `judge_runs.py` judges each run. With `--store FILE`, finished runs are
-kept there, and are not run again.
+waypoints are out of reach. `judge_runs.py` judges each run. With `--store FOLDER`, flights and
+verdicts are kept there: no run is flown again, and it is judged again only if the judge changed.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
-import json
+import math
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from flight_store import Flight, FlightStore, FlownStep, as_json
 from judge_runs import JudgeOptions, Verdict, judge_run
 from sites import box, capsule, mission_of, shipped
 from space import random_frame
-from table import head, heading, row
+from table import head, heading, row, source
 
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.geometry import polylines
@@ -31,7 +33,6 @@ from netsp.plan.space.space_plan import plan
 from netsp.world import Scene
 from netsp.world.mission.equipment import RangeSensor
 from netsp.world.mission.mission import Mission
-from netsp.world.mission.run_log import Run
 from netsp.world.paths.tree import ShortestTree, pull_taut
 from netsp.world.planner import PlannerOptions
 from netsp.world.scene.field import DistanceField
@@ -59,6 +60,13 @@ OVERLAP = 0.08
 
 CLEARANCE = 0.25
 """Clearance in all runs, metres."""
+
+PLAN_S = 6.0
+"""Time limit of the tour that is repaired, s."""
+
+KEPT = ("visited", "waypoints", "contacts", "exceedance_s", "defects", "left_out", "home",
+        "inspection_s", "stalls", "replan_worst_s")  # fmt: skip
+"""Entries of a run's summary that are kept."""
 
 
 def boulders() -> tuple[Mission, Scene]:
@@ -250,99 +258,107 @@ def scenario(kind: str, index: int) -> tuple[Mission, Scene, DistanceField, Scen
     return mission, scene, field, surprises
 
 
-def flown(kind: str, index: int, vehicle: str) -> tuple[Mission, Scene, SceneSurprises | None, Run]:
+def fly(kind: str, index: int, vehicle: str = "kinematic") -> Flight:
     """Fly a run."""
-    mission, scene, field, surprises = scenario(kind, index)
-    planner, options = "predictive", PlannerOptions(seed=index)
-    given = mission
-    if kind == "repair":
-        planner = "repair"
-        options = PlannerOptions(seed=index, planning_limit=2.0)
-        given = plan(mission, scene=scene, field=field, time_limit=6.0).to_mission()
-    run = simulate(given, planner, vehicle=vehicle, scene=scene, field=field, seed=index,
-                   surprises=surprises, options=options)  # fmt: skip
-    return given, scene, surprises, run
-
-
-def outcome(kind: str, index: int, vehicle: str = "kinematic") -> dict[str, Any]:
-    """Fly and judge a run; return its row."""
-    begin = time.process_time()
-    name = SCENES[index % len(SCENES)]
-    row: dict[str, Any] = {"kind": kind, "index": index, "scene": name, "vehicle": vehicle}
+    begin, name = time.process_time(), SCENES[index % len(SCENES)]
+    commit = source()["commit"]
     try:
-        mission, scene, surprises, run = flown(kind, index, vehicle)
+        mission, scene, field, surprises = scenario(kind, index)
+        planner, options, given = "predictive", PlannerOptions(seed=index), mission
+        if kind == "repair":
+            planner = "repair"
+            options = PlannerOptions(seed=index, planning_limit=2.0)
+            given = plan(mission, scene=scene, field=field, time_limit=PLAN_S).to_mission()
+        run = simulate(given, planner, vehicle=vehicle, scene=scene, field=field, seed=index,
+                       surprises=surprises, options=options)  # fmt: skip
     except (InputError, LimitReachedError) as error:
-        return {**row, "refused": str(error), "cpu_s": time.process_time() - begin}
-    flight_s = time.process_time() - begin
-    verdict = judged(mission, scene, surprises, run)
-    s = run.summary
-    kept = ("visited", "waypoints", "contacts", "exceedance_s", "defects", "left_out", "home",
-            "inspection_s", "stalls", "replan_worst_s")  # fmt: skip
-    return {
-        **row, "verdict": vars(verdict), "summary": {k: s[k] for k in kept},
-        "responses": [r["response"] for r in s.get("repairs", ())],
-        "cpu_s": flight_s, "judge_s": time.process_time() - begin - flight_s,
-    }  # fmt: skip
-
-
-def judged(mission: Mission, scene: Scene, surprises: SceneSurprises | None, run: Run) -> Verdict:
-    """Judge a run by its log."""
-    happened = []
+        spent = time.process_time() - begin
+        return Flight(kind, index, name, vehicle, commit, spent, refused=str(error))
+    s, happened = run.summary, []
     if surprises is not None:
-        happened = [(e["time"], surprises.events[e["number"]])
-                    for e in run.summary["surprises"]["events"]]  # fmt: skip
+        happened = [(e["time"], as_json(surprises.events[e["number"]]))
+                    for e in s["surprises"]["events"]]  # fmt: skip
+    return Flight(
+        kind, index, name, vehicle, commit, time.process_time() - begin,
+        mission=as_json(given),
+        scene=as_json(scene),
+        happened=happened,
+        log=[FlownStep(r.time, r.x, r.y, r.z, r.tether, r.mode) for r in run.log],
+        summary={k: s[k] for k in KEPT},
+        responses=[r["response"] for r in s.get("repairs", ())],
+    )  # fmt: skip
+
+
+def judged(flight: Flight) -> Verdict:
+    """Judge a run by its log."""
+    mission = flight.parsed_mission()
     reserve = 0.0 if mission.range_sensor is None else 0.2
-    return judge_run(mission, scene, run.log, happened, reserve, JudgeOptions())
+    return judge_run(mission, flight.parsed_scene(), flight.log, flight.parsed_events(), reserve,
+                     JudgeOptions())  # fmt: skip
+
+
+def runs_of(args: argparse.Namespace) -> Iterator[tuple[Flight, dict[str, Any]]]:
+    """Yield flights and verdicts, those of the store and new ones, until `--cpu-s` are spent."""
+    store, numbers = FlightStore(args.store), args.only or range(args.runs)
+    for index in numbers:
+        if args.scenes is not None and SCENES[index % len(SCENES)] not in args.scenes:
+            continue
+        for kind in args.kinds:
+            is_up = args.finished or time.process_time() > args.cpu_s
+            flight = store.flight(kind, index)
+            if flight is None:
+                if is_up:
+                    continue
+                flight = fly(kind, index, args.vehicle)
+                store.keep_flight(flight)
+            verdict = store.verdict(flight) if flight.refused is None else {}
+            if verdict is None:
+                if is_up:
+                    continue
+                begin = time.process_time()
+                verdict = vars(judged(flight))
+                verdict["judge_s"] = time.process_time() - begin
+                store.keep_verdict(flight, verdict)
+            yield flight, verdict
 
 
 def main() -> None:
     """Fly, judge, and name what went wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--kinds", nargs="*", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--scenes", nargs="*", choices=SCENES, help="only runs in these")
     parser.add_argument("--runs", type=int, default=60, help="of each kind")
     parser.add_argument("--only", type=int, nargs="*", help="numbers of runs")
     parser.add_argument("--vehicle", default="kinematic")
-    parser.add_argument("--store", type=Path, help="file of finished runs, to go on from")
+    parser.add_argument("--store", type=Path, help="folder of flights and verdicts, to go on from")
     parser.add_argument("--finished", action="store_true", help="fly none, show those of --store")
+    parser.add_argument("--cpu-s", type=float, default=math.inf, help="CPU time for new runs, s")
     args = parser.parse_args()
-    done: dict[tuple[str, int], dict[str, Any]] = {}
-    if args.store is not None and args.store.exists():
-        for line in args.store.read_text(encoding="utf-8").splitlines():
-            kept = json.loads(line)
-            done[kept["kind"], kept["index"]] = kept
-    numbers = range(args.runs) if args.only is None else args.only
-    for index in numbers:
-        for kind in args.kinds:
-            if (kind, index) not in done and not args.finished:
-                found = outcome(kind, index, args.vehicle)
-                done[kind, index] = found
-                if args.store is not None:
-                    with args.store.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(found, default=float) + "\n")
+    runs = list(runs_of(args))
     heading("Under way")
     head("what happens", "runs", "scenes", "home", "free", "over the limit", "in a solid",
          "visited", "out of reach", "no room", "lost", "tether and string differ by at most",
          "CPU s a run", name="under-way")  # fmt: skip
     for kind in args.kinds:
-        rows = [done[kind, k] for k in numbers if (kind, k) in done]
-        flights = [r for r in rows if "verdict" in r]
-        v = [r["verdict"] for r in flights]
+        flights = [f for f, _ in runs if f.kind == kind and f.refused is None]
+        v = [v for f, v in runs if f.kind == kind and f.refused is None]
         row(
-            KINDS[kind], len(flights), len({r["scene"] for r in flights}),
+            KINDS[kind], len(flights), len({f.scene_name for f in flights}),
             sum(x["is_home"] for x in v), sum(x["is_free"] for x in v),
             sum(x["over_s"] > 0.0 for x in v), sum(x["room"] < 0.0 for x in v),
             sum(len(x["visited"]) for x in v), sum(len(x["unreachable"]) for x in v),
             sum(len(x["open"]) for x in v), sum(len(x["lost"]) for x in v),
             f"{100 * max((x['difference'] for x in v), default=0.0):.1f} %",
-            f"{np.mean([r['cpu_s'] for r in flights]):.1f}" if flights else "-",
+            f"{np.mean([f.cpu_s for f in flights]):.1f}" if flights else "-",
         )  # fmt: skip
     print()
-    for (kind, index), found in done.items():
-        if "refused" in found:
-            print(f"- {kind} {index}, {found['scene']}: refused: {found['refused']}")
+    for flight, verdict in runs:
+        run = f"{flight.kind} {flight.index}, {flight.scene_name}"
+        if flight.refused is not None:
+            print(f"- {run}: refused: {flight.refused}")
             continue
-        for fault in found["verdict"]["faults"]:
-            print(f"- {kind} {index}, {found['scene']}: {fault}")
+        for fault in verdict["faults"]:
+            print(f"- {run}: {fault}")
 
 
 if __name__ == "__main__":
