@@ -115,13 +115,16 @@ class StateGraph:
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
     _forbidden_via_start: set[tuple[int, int]] = field(default_factory=set)
 
-    def update(self, legs: DrivenLegs, clock: Clock) -> bool:
+    def update(self, legs: DrivenLegs, clock: Clock, *, only_from_start: bool = False) -> bool:
         """Replace the legs, and find paths from the start to new states.
 
         Parameters
         ----------
         clock : Clock
             When it is up, only the first state of each waypoint gets a path from the start.
+        only_from_start : bool
+            Whether states that were not found by a search from the start get no path of their own:
+            the robot gets to them through other states.
 
         Returns
         -------
@@ -136,7 +139,8 @@ class StateGraph:
             # each waypoint needs one path, even if the time is up
             is_complete = is_complete and not clock.is_up
             is_first = self.states.at_place[self.states.entries[v].place][0] == v
-            if is_complete or is_first:
+            is_wanted = not only_from_start or v in self.states.from_start
+            if (is_complete and is_wanted) or is_first:
                 self._paths_out[v] = self._path_along_tether(v)
             else:
                 self._skipped.append(v)

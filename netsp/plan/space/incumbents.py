@@ -120,12 +120,15 @@ class Incumbents:
         """Return whether a tour visits more waypoints than the incumbent, or as many and is
         shorter.
 
-        A tour by going straight on must save more, because it has no bound.
+        A tour by going straight on must save more, because it has no bound. Of two tours that are
+        as long, the one with the higher bound is better.
         """
         without_bound = (GOING_ON, AS_GIVEN, SHORT_ORDER)
         by_going_on = found.tour.solver == GOING_ON and best.tour.solver not in without_bound
         min_saving = self.flights.policy.min_saving if by_going_on else 0.0
-        return _is_shorter(found, best, min_saving)
+        return _is_shorter(found, best, min_saving) or (
+            _has_higher_bound(found, best) and not _is_shorter(best, found)
+        )
 
     def _is_better(self, found: SolvedMission) -> bool:
         """Return whether a tour that passed the judge, and may be better, is not refused by its
@@ -150,6 +153,12 @@ def _is_shorter(found: SolvedMission, best: SolvedMission, min_saving: float = 0
         return len(found.tour.stops) > len(best.tour.stops)
     factor = 1.0 - max(min_saving, LENGTH_ROUNDING)
     return found.length_to_waypoints < factor * best.length_to_waypoints
+
+
+def _has_higher_bound(found: SolvedMission, best: SolvedMission) -> bool:
+    """Return whether more is proven of a tour's states and legs than of another's."""
+    bound, best_bound = found.tour.lower_bound, best.tour.lower_bound
+    return bound is not None and (best_bound is None or bound > best_bound)
 
 
 def _with_words(found: SolvedMission, context: PlanningContext) -> SolvedMission | None:

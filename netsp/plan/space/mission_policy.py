@@ -383,6 +383,12 @@ class StatePolicy:
         Weights of the distance from the start in the trees of legs, one tree for each: 0 grows the
         tree of the shortest legs (Prim), larger weights approach the tree of the shortest paths
         from the start (Dijkstra).
+    max_surrounding
+        Number of new states around a tour from which on the graph is solved before more are added.
+        Each takes about 0.5 ms.
+    max_with_surrounding
+        Number of states of all places from which on none are added around tours; the solver needs
+        eight bytes for each pair.
     """
 
     few_waypoints: int = 24
@@ -418,6 +424,8 @@ class StatePolicy:
     max_robot_ratio: float = 2.0
     max_pull_rounds: int = 300
     tree_trade_offs: tuple[float, ...] = (0.0, 0.05, 0.15, 0.4)
+    max_surrounding: int = 1500
+    max_with_surrounding: int = 5000
 
     def __post_init__(self) -> None:
         check_positive(self)
@@ -454,6 +462,8 @@ class StageTimePolicy:
         Share for the solver in the last stage of growth.
     early_solve_share
         Share for the solver in earlier stages; its tour is the warm start of the next one.
+    surround_share
+        Share for the solver of a graph with states around a tour.
     min_growth_s, min_solve_s
         Seconds for legs and for the solver if the time is up. Without them there would be no tour,
         or only one through the start.
@@ -471,6 +481,7 @@ class StageTimePolicy:
     growth_share: float = 0.5
     solve_share: float = 0.5
     early_solve_share: float = 0.1
+    surround_share: float = 0.3
     min_growth_s: float = 1.0
     min_solve_s: float = 0.5
     max_solves: int = 20
@@ -604,7 +615,7 @@ class MissionPolicy:
     """
 
     round_s: float = 8.0
-    round_growth: float = 4.0
+    round_growth: float = 8.0
     planning_share: float = 0.7
     bound_share: float = 0.3
     going_on_share: float = 0.3

@@ -46,6 +46,7 @@ from netsp.plan.space.space_plan import (
     PLANE,
     SHORT_ORDER,
     TAUT_LEGS,
+    TAUT_SO_FAR,
     SpacePlan,
     StagedSearch,
     check_plannable,
@@ -427,7 +428,7 @@ def _raise_bound(
     """Bound all tours to the waypoints of a plan.
 
     The first plans are bounded by the upright solids alone, which takes little time; once paths
-    between waypoints are known, by all bounds.
+    between waypoints are known and no better tour is being searched for, by all bounds.
     """
     visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
     before = searched.bounds.get(visited)
@@ -438,7 +439,7 @@ def _raise_bound(
         bound = bound_by_upright_solids(
             flights.mission, flights.context, visited_places, places, part
         )
-    elif plan.kind not in (PLANE, SHORT_ORDER) and not searched.has_all_bounds:
+    elif plan.kind not in (PLANE, SHORT_ORDER, TAUT_SO_FAR) and not searched.has_all_bounds:
         flights.on_progress("bound on all tours")
         bound = bound_all_tours(plan.paths, sorted(visited), part, seed)
         searched.has_all_bounds = True

@@ -208,6 +208,12 @@ class DrivenLegs:
 
     arrives: dict[tuple[int, int], Floats] = field(default_factory=dict)
 
+    def add(self, v: int, w: int, path: Floats) -> None:
+        """Add a leg along a path (k, 3), metres, unless a shorter one is known."""
+        old = self.arrives.get((v, w))
+        if old is None or polylines.length(path) < polylines.length(old):
+            self.arrives[v, w] = path
+
     def both_directions(self) -> Iterator[tuple[int, int, Floats, bool]]:
         """Yield each leg once.
 
@@ -250,10 +256,25 @@ class StateGrowth:
     The tether of each state is driven along all paths to neighbouring places, and where it arrives
     is a state, too. The shortest legs come first, so that states are found in chains of neighbours,
     and the legs known when the time is up connect them.
+
+    Where words tell all states of a place apart, a leg need not be driven to know where it arrives:
+    the word of a state times the word of a path is the word at its end, and a tether that is not
+    known there yet is pulled taut, which takes a tenth of the time. Whether the tether keeps its
+    limit all along such a leg is known once a tour along it is driven.
+
+    Attributes
+    ----------
+    states, paths
+        The states, and the paths of the robot.
+    by_words
+        Whether legs arrive where their words say, and are not driven.
+    legs
+        Legs so far.
     """
 
     states: States
     paths: RobotPaths
+    by_words: bool = False
     legs: DrivenLegs = field(default_factory=DrivenLegs)
     _queue: list[_QueuedLeg] = field(default_factory=list)
     _postponed: list[_QueuedLeg] = field(default_factory=list)
@@ -262,6 +283,12 @@ class StateGrowth:
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
     # states, places and paths that are queued or driven already
     _queued: set[tuple[int, int, int, float]] = field(default_factory=set)
+    # state of each place and word, and those whose tether exceeds the limit; used by words only
+    _state_of: dict[tuple[int, int], int] = field(default_factory=dict)
+    _count_by_word: int = 0
+    _too_long: set[tuple[int, int]] = field(default_factory=set)
+    # states whose legs lead to states of all words already
+    _surrounded: set[int] = field(default_factory=set)
 
     def queue_new_paths(self) -> None:
         """Queue the paths that were found since the states at their ends were queued."""
@@ -318,11 +345,14 @@ class StateGrowth:
             return False
         leg = heapq.heappop(self._queue)
         _, _, v, target, word, path = leg
-        states, legs = self.states, self.legs
+        states = self.states
         state = states.entries[v]
         new_word = states.context.words.multiply(state.word, word)
         if not states.can_hold(target, new_word):
             self._postponed.append(leg)
+            return True
+        if self.by_words:
+            self._add_by_word(v, target, new_word, path)
             return True
         if not self._may_fit(state, target, new_word, path):
             return True
@@ -335,10 +365,75 @@ class StateGrowth:
         if w is None:
             self._postponed.append(leg)
         else:
-            old = legs.arrives.get((v, w))
-            if old is None or polylines.length(path) < polylines.length(old):
-                legs.arrives[v, w] = path
+            self.legs.add(v, w, path)
         return True
+
+    def surround(self, tour: Iterable[int], max_new: int, clock: Clock) -> int:
+        """Add all states that one leg leads to from the states of a tour, whatever the maximum per
+        place, and the legs between these and all others; return the number of new states.
+
+        States must be told apart by words (`by_words`).
+
+        Parameters
+        ----------
+        tour : iterable of int
+            States of the tour.
+        max_new : int
+            Number of new states from which on the rest of the tour is left for the next call.
+        clock : Clock
+            When it is up, the rest of the tour is left out.
+        """
+        first = len(self.states.entries)
+        for v in tour:
+            if clock.is_up or len(self.states.entries) - first >= max_new:
+                break
+            if v not in self._surrounded:
+                self._surrounded.add(v)
+                self._add_legs_from(v, with_new=True)
+        for v in range(first, len(self.states.entries)):
+            self._add_legs_from(v, with_new=False)
+        # their legs to states that are not known yet are not queued
+        self._known = max(self._known, len(self.states.entries))
+        return len(self.states.entries) - first
+
+    def _add_legs_from(self, v: int, *, with_new: bool) -> None:
+        """Add the legs from a state by their words; with new states, or only to known ones."""
+        state, multiply = self.states.entries[v], self.states.context.words.multiply
+        for m in self.paths.neighbours[state.place]:
+            target = int(m)
+            for path_word, path in self.paths.between(state.place, target):
+                word = multiply(state.word, path_word)
+                if with_new or (target, word) in self._by_word:
+                    self._add_by_word(v, target, word, path, beyond_max=with_new)
+
+    @property
+    def _by_word(self) -> dict[tuple[int, int], int]:
+        """Return the states by place and word."""
+        entries = self.states.entries
+        for s in range(self._count_by_word, len(entries)):
+            self._state_of.setdefault((entries[s].place, entries[s].word), s)
+        self._count_by_word = len(entries)
+        return self._state_of
+
+    def _add_by_word(
+        self, v: int, target: int, word: int, path: Floats, *, beyond_max: bool = False
+    ) -> None:
+        """Add the leg along a path to the state of a word, and that state if it is not known."""
+        key = target, word
+        w = self._by_word.get(key)
+        if w is None and key not in self._too_long:
+            states = self.states
+            line = np.vstack([states.entries[v].tether.nodes, path[1:]])
+            tether = states.context.model.relaxed(
+                line, states.context.policy.states.max_pull_rounds
+            )
+            if tether.length > states.limit:
+                self._too_long.add(key)
+            else:
+                w = states.add(target, word, tether, beyond_max=beyond_max)
+        if w is not None:
+            self.legs.add(v, w, path)
+            self.legs.add(w, v, path[::-1])
 
     def _may_fit(self, state: State, target: int, word: int, path: Floats) -> bool:
         """Return whether the tether may be within its limit at the end of a path. Pulling it taut

@@ -54,6 +54,9 @@ from netsp.world.simulator.mission_run import mission_grid
 TAUT_LEGS = "taut"
 """Kind of a plan along states and their taut legs."""
 
+TAUT_SO_FAR = "taut so far"
+"""Kind of a plan along states and their taut legs, while the search for shorter ones goes on."""
+
 DETOURS = "detours"
 """Kind of a plan along states and legs with detours."""
 
@@ -97,8 +100,8 @@ class SpacePlan:
     paths
         The robot's paths between waypoints.
     kind
-        Kind of the plan: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
-        `AS_GIVEN`.
+        Kind of the plan: `TAUT_LEGS`, `TAUT_SO_FAR`, `DETOURS`, `PLANE`, `SHORT_ORDER`,
+        `OUT_AND_BACK` or `AS_GIVEN`.
     """
 
     mission: Mission
@@ -179,7 +182,7 @@ class SpacePlan:
             status=status_of_tour(
                 self.length, result.lower_bound, bound, is_complete=not self.unreached
             ),
-            solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind,
+            solver=solver if self.kind in (TAUT_LEGS, TAUT_SO_FAR, DETOURS) else self.kind,
             seed=seed,
             length=self.length,
             lower_bound=result.lower_bound,
@@ -316,9 +319,9 @@ def candidate_plans(
     ------
     SpacePlan
         First, among upright prisms, the tours of the plane, or if there are none, the tour in a
-        short order; then the tour with detours, if it is shorter than the tour along taut legs;
-        then the tour along taut legs; last the tour out and back to each waypoint, which is
-        computed only if the caller asks for it.
+        short order; then ever shorter tours along taut legs; then the tour with detours, if it is
+        shorter than the tour along taut legs; then the tour along taut legs; last the tour out and
+        back to each waypoint, which is computed only if the caller asks for it.
 
     Raises
     ------
@@ -651,10 +654,13 @@ def _plan_of_search(
 
 
 def _candidates(search: StateSearch) -> Iterator[SpacePlan]:
-    """Yield the candidates along states and legs."""
+    """Yield the candidates along states and legs: each tour that is shorter than those before, then
+    those that `candidate_plans` names."""
     run, mission = search.run, search.run.mission
     search.connect()
-    best, is_complete = search.best_along_taut_legs()
+    for found in search.tours_along_taut_legs():
+        yield _plan_of_search(search, *found, TAUT_SO_FAR)
+    best, is_complete = search.best, search.is_complete
     if not search.board.reached_waypoints:
         raise InputError(
             f"waypoints: the robot reaches none of them with its clearance of {mission.clearance:g}"

@@ -8,7 +8,7 @@ first leg that did not arrive in its state is forbidden, and the graph is solved
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,6 +75,9 @@ class SearchRun:
         return int(self.options["seed"])
 
 
+FAST_SOLVER = "lns"
+"""Solver of a graph with states around a tour, instead of `auto`: a search without a proof."""
+
 FIRST_STATES = "shortest tethers to each waypoint"
 """Name of the search for the first states in progress messages."""
 
@@ -116,6 +119,13 @@ class StateSearch:
     ----------
     run : SearchRun
         The run.
+
+    Attributes
+    ----------
+    best
+        Best tour so far that was driven, with the result of the solver; None if there is none.
+    is_complete
+        Whether all legs were found in some stage of growth.
     """
 
     def __init__(self, run: SearchRun) -> None:
@@ -128,7 +138,8 @@ class StateSearch:
         self.board = StateGraph(run.context, self.states)
         self.growth = StateGrowth(self.states, self.paths)
         self._paths_in_trees, self._lacks_trees = 0, True
-        self._best: tuple[Result, DrivenTour] | None = None
+        self.best: tuple[Result, DrivenTour] | None = None
+        self.is_complete = False
         self._solved: tuple[int, int] | None = None
         self._set_tethers()
 
@@ -142,10 +153,10 @@ class StateSearch:
             add_first_states(self.states, self.effort, part)
             self._lacks_first_states = part.is_up
             self._set_tethers()
-        if self._best is not None:
+        if self.best is not None:
             # what was proven of the graph before says nothing of the one that comes
-            result, driven = self._best
-            self._best = replace(result, status=Status.FEASIBLE, lower_bound=None), driven
+            result, driven = self.best
+            self.best = replace(result, status=Status.FEASIBLE, lower_bound=None), driven
 
     def _set_tethers(self) -> None:
         """Give the tethers of the first states to the robot's paths."""
@@ -173,49 +184,94 @@ class StateSearch:
         self.growth.queue_new_paths()
         self.growth.grow(0, clock.part(times.tree_share), on_progress)
 
-    def best_along_taut_legs(self) -> tuple[tuple[Result, DrivenTour] | None, bool]:
-        """Grow states and legs in stages, and return the best tour along them, and whether all legs
-        were driven in some stage."""
+    def tours_along_taut_legs(self) -> Iterator[tuple[Result, DrivenTour]]:
+        """Grow states and legs in stages, and yield each tour along them that is shorter than those
+        before. The last one is `best`, too; `is_complete` says whether all legs were found in some
+        stage."""
         run, times, board = self.run, self.run.times, self.board
         on_progress, options = run.on_progress, run.options
-        clock = run.clock.part(times.taut_share)
-        is_complete = False
-        for max_per_place in self.effort.states:
+        self.growth.by_words = self._words_tell_states_apart
+        clock = run.clock if self.growth.by_words else run.clock.part(times.taut_share)
+        self.is_complete = False
+        # legs that are not driven take little time, so the fewest states are not worth a stage
+        stages = self.effort.states[1:] if self.growth.by_words else ()
+        for max_per_place in stages or self.effort.states:
             begin = clock.elapsed
             growth_s = times.growth_share * clock.planned_left
             has_time = board.legs or growth_s >= times.min_growth_s
             growing = clock.part(times.growth_share) if has_time else Clock(times.min_growth_s)
             has_grown = self.growth.grow(max_per_place, growing, on_progress)
             on_progress("paths by way of the anchor")
-            has_homes = board.update(self.growth.legs, clock.part(times.home_path_share))
-            is_complete = (has_homes and has_grown) or is_complete
+            has_homes = self._update_board(clock)
+            self.is_complete = (has_homes and has_grown) or self.is_complete
             is_last = max_per_place == self.effort.states[-1]
-            self._solve(clock, times.solve_share if is_last else times.early_solve_share, options)
+            share = times.solve_share if is_last else times.early_solve_share
+            yield from self._solve(clock, share, options)
+            yield from self._surround_tours(clock)
             if clock.planned_left < clock.elapsed - begin:
                 if not is_last and not self._is_optimal:
-                    self._solve(clock, times.solve_share, options)
+                    yield from self._solve(clock, times.solve_share, options)
                 break
-        return self._best, is_complete
+
+    @property
+    def _words_tell_states_apart(self) -> bool:
+        """Return whether states are told apart by their words, as far as is known."""
+        return self.run.context.words.exact and not self.states.has_free_ends
+
+    def _update_board(self, clock: Clock) -> bool:
+        """Give the legs so far to the board; return whether there was time for all paths from the
+        start."""
+        part = clock.part(self.run.times.home_path_share)
+        by_words = self.growth.by_words
+        return self.board.update(self.growth.legs, part, only_from_start=by_words)
+
+    def _surround_tours(self, clock: Clock) -> Iterator[tuple[Result, DrivenTour]]:
+        """Add the states around the best tour, and solve again, until no states are new, or the
+        time is up; yield each shorter tour.
+
+        A tour among few states per place is often a short order with the tether on a wrong side of
+        some solids. States around it hold the tours that pass one of them otherwise.
+        """
+        policy, run = self.run.context.policy.states, self.run
+        options = run.options
+        if options["solver"] == "auto":
+            options = {**options, "solver": FAST_SOLVER}
+        while self.growth.by_words and self.best is not None and not clock.is_up:
+            room = policy.max_with_surrounding - len(self.states.entries)
+            run.on_progress("states around the tour")
+            tour, count = self.best[1].tour, min(policy.max_surrounding, room)
+            if not self.growth.surround(tour, count, clock):
+                return
+            self._update_board(clock)
+            yield from self._solve(clock, run.times.surround_share, options)
 
     @property
     def _is_optimal(self) -> bool:
         """Return whether the best tour is the shortest along the states and legs found."""
-        return self._best is not None and self._best[0].status is Status.OPTIMAL_OF_STATES
+        return self.best is not None and self.best[0].status is Status.OPTIMAL_OF_STATES
 
-    def _solve(self, clock: Clock, share: float, options: dict[str, Any]) -> None:
-        """Solve the graph and drive its tour, unless that was done for the same graph."""
+    def _solve(
+        self, clock: Clock, share: float, options: dict[str, Any]
+    ) -> Iterator[tuple[Result, DrivenTour]]:
+        """Solve the graph and drive its tour, unless that was done for the same graph; yield the
+        tour if it is shorter than the best before."""
         graph = len(self.states.entries), len(self.growth.legs.arrives)
         if self._is_optimal and self._solved == graph:
             return
-        found = _best_driven(self.board, clock, self.run.on_progress, self._best, share, options)
-        self._best, self._solved = _better(self._best, found), graph
+        found = _best_driven(self.board, clock, self.run.on_progress, self.best, share, options)
+        before = self.best
+        self.best, self._solved = _better(before, found), graph
+        if self.best is not None and (
+            before is None or self.best[1].length < before[1].length * (1.0 - LENGTH_ROUNDING)
+        ):
+            yield self.best
 
     def shorter(self, best: DrivenTour | None, is_proven: bool) -> DrivenTour | None:
         """Return a shorter tour with detours, if there is one.
 
         If words distinguish all states, detours lead to the tethers that straight legs lead to.
         """
-        if is_proven and not self.states.has_free_ends:
+        if (is_proven or self.growth.by_words) and not self.states.has_free_ends:
             return None
         run = self.run
         return Detours(self.board, self.paths).shorten(best, run.clock, run.on_progress, run.seed)

@@ -60,6 +60,8 @@ class States:
         The states.
     at_place
         Numbers of the states of each place.
+    from_start
+        Numbers of the states that were found by a search from the start.
     """
 
     context: PlanningContext
@@ -68,6 +70,7 @@ class States:
     max_per_place: int
     entries: list[State] = field(default_factory=list)
     at_place: dict[int, list[int]] = field(default_factory=dict)
+    from_start: set[int] = field(default_factory=set)
 
     def find(self, point: int, word: int, tether: Tether) -> int | None:
         """Return the number of the state that a tether is in; None if it is in none so far."""
@@ -83,12 +86,18 @@ class States:
         has_room = len(numbers) < self.max_per_place and point != self.places.present
         return has_room or any(self.entries[s].word == word for s in numbers)
 
-    def add(self, point: int, word: int, tether: Tether) -> int | None:
+    def add(self, point: int, word: int, tether: Tether, *, beyond_max: bool = False) -> int | None:
         """Add a state and return its number; None if the place has no room for another state, or
-        the tether exceeds its limit."""
+        the tether exceeds its limit.
+
+        Parameters
+        ----------
+        beyond_max : bool
+            Whether the place may get more states than the maximum.
+        """
         numbers = self.at_place.setdefault(point, [])
         if (
-            len(numbers) >= self.max_per_place
+            (len(numbers) >= self.max_per_place and not beyond_max)
             or tether.length > self.limit
             or (point == self.places.present and numbers)
         ):
@@ -216,4 +225,6 @@ def _add_states(states: States, n: int, found: WordSearch, line: Floats, max_sta
             continue
         hanging_word = context.word_number(tether.nodes)
         if hanging_word is not None and states.find(n, hanging_word, tether) is None:
-            states.add(n, hanging_word, tether)
+            number = states.add(n, hanging_word, tether)
+            if number is not None:
+                states.from_start.add(number)
