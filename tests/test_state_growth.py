@@ -57,7 +57,7 @@ def named_legs(growth: StateGrowth) -> dict[tuple, float]:
 
 
 def test_legs_by_words_are_those_that_driving_finds(among_posts):
-    """Around posts through all depths words tell all tethers apart, so each driven leg arrives
+    """Around posts through all depths words distinguish all tethers, so each driven leg arrives
     where its word says; by words there may be more, on which the tether is too long half-way."""
     driven = named_legs(grown(among_posts, by_words=False, max_per_place=30))
     by_words = named_legs(grown(among_posts, by_words=True, max_per_place=30))

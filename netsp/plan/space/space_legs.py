@@ -257,17 +257,19 @@ class StateGrowth:
     is a state, too. The shortest legs come first, so that states are found in chains of neighbours,
     and the legs known when the time is up connect them.
 
-    Where words tell all states of a place apart, a leg need not be driven to know where it arrives:
-    the word of a state times the word of a path is the word at its end, and a tether that is not
-    known there yet is pulled taut, which takes a tenth of the time. Whether the tether keeps its
-    limit all along such a leg is known once a tour along it is driven.
+    Where words distinguish the states of a place, a leg need not be driven to know where it
+    arrives: the word of a state times the word of a path is the word at its end, and a tether that
+    is not known there yet is pulled taut, which takes a tenth of the time. Whether the tether keeps
+    its limit all along such a leg is known once a tour along it is driven. Legs to a place where
+    two tethers of that word hang differently are driven all the same.
 
     Attributes
     ----------
     states, paths
         The states, and the paths of the robot.
     by_words
-        Whether legs arrive where their words say, and are not driven.
+        Whether legs arrive where their words say, and are driven only where a word does not say in
+        which of several states.
     legs
         Legs so far.
     """
@@ -283,9 +285,11 @@ class StateGrowth:
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
     # states, places and paths that are queued or driven already
     _queued: set[tuple[int, int, int, float]] = field(default_factory=set)
-    # state of each place and word, and those whose tether exceeds the limit; used by words only
+    # state of each place and word, those with several states, and those whose tether exceeds the
+    # limit; used by words only
     _state_of: dict[tuple[int, int], int] = field(default_factory=dict)
     _count_by_word: int = 0
+    _ambiguous: set[tuple[int, int]] = field(default_factory=set)
     _too_long: set[tuple[int, int]] = field(default_factory=set)
     # states whose legs lead to states of all words already
     _surrounded: set[int] = field(default_factory=set)
@@ -353,26 +357,32 @@ class StateGrowth:
             return True
         if self.by_words:
             self._add_by_word(v, target, new_word, path)
-            return True
-        if not self._may_fit(state, target, new_word, path):
-            return True
-        tether, longest = states.context.drive(state.tether, path)
+        elif self._may_fit(state, target, new_word, path) and not self._add_driven(
+            v, target, new_word, path
+        ):
+            self._postponed.append(leg)
+        return True
+
+    def _add_driven(self, v: int, target: int, word: int, path: Floats) -> bool:
+        """Drive the tether of a state along a path, and add the leg to the state in which it
+        arrives; return False if that place has no room for another state."""
+        states = self.states
+        tether, longest = states.context.drive(states.entries[v].tether, path)
         if longest > states.limit:
             return True
-        w = states.find(target, new_word, tether)
+        w = states.find(target, word, tether)
         if w is None:
-            w = states.add(target, new_word, tether)
+            w = states.add(target, word, tether)
         if w is None:
-            self._postponed.append(leg)
-        else:
-            self.legs.add(v, w, path)
+            return False
+        self.legs.add(v, w, path)
         return True
 
     def surround(self, tour: Iterable[int], max_new: int, clock: Clock) -> int:
         """Add all states that one leg leads to from the states of a tour, whatever the maximum per
         place, and the legs between these and all others; return the number of new states.
 
-        States must be told apart by words (`by_words`).
+        Words must distinguish states (`by_words`).
 
         Parameters
         ----------
@@ -411,7 +421,9 @@ class StateGrowth:
         """Return the states by place and word."""
         entries = self.states.entries
         for s in range(self._count_by_word, len(entries)):
-            self._state_of.setdefault((entries[s].place, entries[s].word), s)
+            key = entries[s].place, entries[s].word
+            if self._state_of.setdefault(key, s) != s:
+                self._ambiguous.add(key)
         self._count_by_word = len(entries)
         return self._state_of
 
@@ -421,6 +433,9 @@ class StateGrowth:
         """Add the leg along a path to the state of a word, and that state if it is not known."""
         key = target, word
         w = self._by_word.get(key)
+        if key in self._ambiguous:
+            self._add_driven(v, target, word, path)
+            return
         if w is None and key not in self._too_long:
             states = self.states
             line = np.vstack([states.entries[v].tether.nodes, path[1:]])

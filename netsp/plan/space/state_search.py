@@ -190,8 +190,10 @@ class StateSearch:
         stage."""
         run, times, board = self.run, self.run.times, self.board
         on_progress, options = run.on_progress, run.options
-        self.growth.by_words = self._words_tell_states_apart
-        clock = run.clock if self.growth.by_words else run.clock.part(times.taut_share)
+        words = run.context.words
+        self.growth.by_words = words.exact and words.group.rank > 0
+        needs_no_detours = self.growth.by_words and not self.states.has_free_ends
+        clock = run.clock if needs_no_detours else run.clock.part(times.taut_share)
         self.is_complete = False
         # legs that are not driven take little time, so the fewest states are not worth a stage
         stages = self.effort.states[1:] if self.growth.by_words else ()
@@ -212,11 +214,6 @@ class StateSearch:
                 if not is_last and not self._is_optimal:
                     yield from self._solve(clock, times.solve_share, options)
                 break
-
-    @property
-    def _words_tell_states_apart(self) -> bool:
-        """Return whether states are told apart by their words, as far as is known."""
-        return self.run.context.words.exact and not self.states.has_free_ends
 
     def _update_board(self, clock: Clock) -> bool:
         """Give the legs so far to the board; return whether there was time for all paths from the
