@@ -2,10 +2,9 @@
 
     python benchmarks/currents.py [--missions ring comb …] [--flights FILE] [--limit 600] [--keep]
 
-Missions of at most `MAX_SHORT` waypoints are flown in all 18 combinations, the others in three, one
-for each speed. The flights are appended to a file as they end, and those that it has are not flown
-again; `--limit` is the CPU time, s, after which no flight begins. A row counts the flights that
-have ended.
+The flights are appended to a file as they end, and those that it has are not flown again;
+`--limit` is the CPU time, s, after which no flight begins. A row counts the flights that have
+ended.
 """
 
 from __future__ import annotations
@@ -38,9 +37,6 @@ CURRENTS = (
     (0.0, 0.0, 0.3),
 )
 """Velocities of the water, m/s."""
-
-MAX_SHORT = 12
-"""Largest number of waypoints of a mission that is flown in all combinations."""
 
 HELD_OUT = 2
 """Number of random scenes of each kind."""
@@ -110,14 +106,11 @@ def _others() -> list[Path]:
     return [file for folder in SCENES for file in sorted(folder.glob("*-tight.json"))]
 
 
-def flights(name: str, waypoints: int, number: int) -> Iterator[Flight]:
-    """Yield the flights of a mission; its number chooses the currents of a long one."""
-    for k, speed in enumerate(SPEEDS):
-        if waypoints <= MAX_SHORT:
-            for n in range(len(CURRENTS)):
-                yield name, speed, n
-        else:
-            yield name, speed, (number + 2 * k) % len(CURRENTS)
+def flights(name: str) -> Iterator[Flight]:
+    """Yield the flights of a mission: all speeds in all currents."""
+    for speed in SPEEDS:
+        for current in range(len(CURRENTS)):
+            yield name, speed, current
 
 
 def flown(mission: Mission, scene: Scene, speed: float, current: int) -> dict[str, Any]:
@@ -188,9 +181,7 @@ def main() -> None:
             done[flight["key"][0], flight["key"][1], flight["key"][2]] = flight
     wanted: dict[str, list[Flight]] = {}
     for name in args.missions:
-        known = next((f["waypoints"] for key, f in done.items() if key[0] == name), None)
-        points = len(mission_of(name)[0].waypoints) if known is None else known
-        wanted[name] = list(flights(name, points, names().index(name)))
+        wanted[name] = list(flights(name))
         missing = [key for key in wanted[name] if key not in done]
         if not missing or time.process_time() > args.limit:
             continue

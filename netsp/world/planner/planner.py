@@ -169,6 +169,8 @@ class Planner:
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     given: list[int] = field(default_factory=list)
     _held: int = 0
+    # places where the robot has been, half a cell apart
+    _places: list[Floats] = field(default_factory=list)
 
     name = "none"
     refine = "none"
@@ -333,6 +335,8 @@ class Planner:
         The method never raises. If no plan is found, the robot holds its place, or leaves out the
         waypoint and logs the reason.
         """
+        if not self._places or math.dist(robot, self._places[-1]) >= 0.5 * self.grid.cell:
+            self._places.append(np.array(robot))
         self._advance(robot, tether)
         self._follow_home(robot)
         if self.is_done:

@@ -72,6 +72,10 @@ class PredictivePolicy:
         metres.
     home_check_steps
         Number of steps between two checks that the tether still comes free on the path home.
+    min_home_room
+        Share of the clearance, or of the room at its ends if that is less, that a path home keeps.
+        If it comes nearer to solids, the robot goes home the way it came, pulled taut, where that
+        keeps more room.
     max_home_attempts
         Maximum number of times that the robot goes back along a tether which is not free at home.
     pull_rounds
@@ -98,6 +102,7 @@ class PredictivePolicy:
     unmapped_reserve: float = 0.2
     snag_tolerance: float = 0.1
     home_check_steps: int = 20
+    min_home_room: float = 0.5
     max_home_attempts: int = 3
     pull_rounds: int = 10
     max_pulls: int = 10

@@ -498,6 +498,9 @@ class PredictivePlanner(Planner):
         self._is_sure_of_home = path is not None
         if path is None:
             path = self._home_along(tether)
+            if self._is_narrow(path):
+                as_it_came = self._home_as_it_came(robot, tether)
+                path = path if as_it_came is None else as_it_came
         self.path, self.mode = path[1:], HOME
         return True
 
@@ -542,6 +545,38 @@ class PredictivePlanner(Planner):
         if not self._is_sure_of_home and path is not line:
             path, self._is_sure_of_home = line, self._comes_free(tether, line)
         return path
+
+    def _home_as_it_came(self, robot: Floats, tether: Tether) -> Floats | None:
+        """Return the path home the way that the robot came, pulled as far as the tether fits and
+        comes free.
+
+        A tether may hang in a gap that is too narrow for the robot, and so may a path back along
+        it. Where the robot has been, it had room.
+
+        Returns
+        -------
+        ndarray, shape (k, 3), or None
+            The path, metres; None if it does not begin at the start of the mission, comes as near
+            to solids, or does not free the tether.
+        """
+        if math.dist(self._places[0], self.mission.start) > self.mission.reach:
+            return None
+        line = np.vstack([robot, *self._places[::-1], self.home_position])
+        for path in (self._tautest(tether, line, self.limit), line):
+            if path is None or self._is_narrow(path):
+                continue
+            far, end = self._preview.follow(tether, path, self.limit, 0.0)
+            if np.isinf(far) and self._is_free(end):
+                self._is_sure_of_home = True
+                return path
+        return None
+
+    def _is_narrow(self, path: Floats) -> bool:
+        """Return whether a path comes nearer to solids than a path home should
+        (`PredictivePolicy.min_home_room`)."""
+        distances = self.scene.distance(polylines.points_along(path, self.fine_spacing))
+        room = min(self.mission.clearance, float(distances[0]), float(distances[-1]))
+        return float(distances.min()) < self.predictive.min_home_room * room
 
     def _is_tether_lost(self, robot: Floats, tether: Tether) -> bool:
         """Return whether the tether no longer comes free on the rest of the path home, for example
