@@ -58,7 +58,9 @@ MESHES = (
     "TorqueTool.dae", "HotStab.dae", "ADIS16480.STL", "no_indices_3storybuilding.glb",
     "cheburashka.obj", "aurora_collision.stl", "stanford-bunny.obj", "beetle-alt.obj", "ogre.obj",
 )  # fmt: skip
-"""Names of the files. Further ones in the folder are left out."""
+"""Names of the files. Further ones in the folder are left out. They come from the repositories
+mikedh/trimesh (folder `models`), alecjacobson/common-3d-test-models (`data`),
+KhronosGroup/glTF-Sample-Models and uuvsimulator/uuv_simulator on GitHub."""
 
 VARIANTS = {"spot.obj": "inverted", "homer.obj": "half of the faces turned", "rabbit.obj": "soup"}
 """Defects that are made in sound meshes, because no file has them. Such a mesh is a further row."""
@@ -88,7 +90,7 @@ class Outcome:
 
 CAUSES = (
     "one face only", "no clear outside", "parts thinner", "disagree on the outside", "overlap",
-    "inside out", "on the back of others", "m across",
+    "inside out", "on the back of others", "thickness of", "m across",
 )  # fmt: skip
 """Parts of the notes that name a reason not to trust a mesh."""
 

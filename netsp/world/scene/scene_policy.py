@@ -29,7 +29,8 @@ class GridPolicy:
         Half thickness of surfaces without an inside, voxels. With one voxel, interpolation would
         round both sides into one, and lengths of tethers would depend on their resolution.
     max_hidden_share
-        Share of the sides of sheets within the thickness of others from which on a note says so.
+        Share of the surface, as sides of sheets within the thickness of others, from which on a
+        note says so.
     block_reach
         Distance of a corner from a surface, in sides of a cell, up to which the cell is a block.
     inside_block_reach

@@ -196,8 +196,8 @@ class _Triangles:
             share = self._hidden_share(lattice, values, shell)
             if share > max_hidden_share:
                 notes.append(
-                    f"{percent(share)} of the sides of sheets lie within the thickness of others: "
-                    f"hidden from cameras; voxels smaller than {size:.3g} show more of them"
+                    f"{percent(share)} of the surface is sides of sheets within the thickness of "
+                    f"others: hidden from cameras; voxels smaller than {size:.3g} show more of them"
                 )
         end_if_abandoned()
         enclosed = lattice.unreached(values)
@@ -207,7 +207,7 @@ class _Triangles:
         return values, notes, grow
 
     def _hidden_share(self, lattice: Lattice, values: Singles, shell: float) -> float:
-        """Return the share of the area of the sides of sheets that lies in something solid."""
+        """Return the share of the surface that is sides of sheets in something solid."""
         normals = np.cross(self.sheet[:, 1] - self.sheet[:, 0], self.sheet[:, 2] - self.sheet[:, 0])
         double_areas = np.linalg.norm(normals, axis=1)
         normals /= np.maximum(double_areas, 1e-300)[:, None]
@@ -217,7 +217,10 @@ class _Triangles:
             for side in (shell + lattice.size, -shell - lattice.size):
                 at = places + side * normals
                 hidden += float(double_areas[lattice.minimum_nearby(values, at, 0) < 0.0].sum())
-        return hidden / (2.0 * len(_SPREAD) * float(double_areas.sum()))
+        area = 2.0 * float(double_areas.sum())
+        if len(self.surface):
+            area += float(_double_areas(self.surface).sum())
+        return hidden / (len(_SPREAD) * area)
 
     def _check_shell(self, shell: float, size: float, source: str) -> None:
         """Raise InputError if sheets are thicker than the mesh is across."""
