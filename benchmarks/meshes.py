@@ -225,7 +225,7 @@ def main() -> None:
         row(
             f"{name}, {how}" if how else name, o.faces, f"{o.area:.1f}", f"{o.area_by_rays:.1f}",
             f"{o.seen:.1f}", f"{o.seen_by_rays:.1f}", f"{o.flown:.1f}", f"{o.flown_by_rays:.1f}",
-            "yes" if is_good else f"no, {off:.1f}", f"{o.field_s:.1f}", f"{o.cover_s:.0f}",
+            "yes" if is_good else f"no, {off:.2f}", f"{o.field_s:.1f}", f"{o.cover_s:.0f}",
             f"{o.solve_s:.0f}", f"{o.simulate_s:.0f}", o.solved, o.visited, o.error or causes(o),
         )  # fmt: skip
     print(f"\n{good} of {len(chosen)} within {TOLERANCE:g} points of the rays")
