@@ -1,8 +1,11 @@
-"""Cables in a physics engine (MuJoCo): balls joined by limited tendons, reeled in at the anchor.
+"""Cables in a physics engine (MuJoCo): links between point masses, reeled in at the anchor.
 
-Each ball is a point mass with a round hull that cannot roll, so friction acts on the cable as it is
-dragged over a surface. Solids are thinner by the radius of the balls, so that the middle of the
-cable runs where the taut tether of the same scene does.
+A cable is a flexible body of one dimension. Its links are round rods, so edges of solids touch it
+anywhere along a link; with balls only, edges would catch between them, as if there were friction.
+Limited tendons keep the links from stretching. Solids are thinner by the radius of the links, so
+that the middle of the cable runs where the taut tether of the same scene does. `cable_forms.py`
+measures the error of such cables against closed forms. MuJoCo comes with
+`pip install 'netsp[bench]'`.
 """
 
 from __future__ import annotations
@@ -25,42 +28,65 @@ class CableParams:
     Attributes
     ----------
     spacing
-        Distance between neighbouring balls when the cable is taut, metres. At most about the
-        radius of the thinnest bar, so that no bar passes between two balls.
-    ball_radius
-        Radius of a ball, metres; below that of the thinnest bar.
+        Length of a link, metres. At an edge, the cable is longer than a taut curve by up to
+        0.3 of it.
+    radius
+        Radius of a link, metres; below that of the thinnest bar, and below half the thickness of
+        the thinnest box. Around a right angle, the cable is shorter by 0.43 of it than around a
+        sharp edge.
     tension
         Pull of the winch, N.
     mass
-        Mass of a ball, kg.
+        Mass of a link, kg.
     drag
-        Viscous drag of a ball, N s/m. All balls together drag little of the tension at `speed`.
+        Viscous drag of a link along the cable, N s/m. The whole cable drags little of the tension
+        at `speed`.
+    normal_drag
+        Viscous drag of a link across the cable, N s/m. It ends the whirling of a cable that is
+        reeled in; without it, a short cable stays longer than a taut one.
     speed
         Speed of the robot, m/s.
     step_s
         Time step, s.
+    contact_s
+        Time constant of contacts, s. At the default, a link sinks in by less than a millimetre.
+    tendon_s
+        Time constant of the tendons, s.
+    friction_stiffness
+        Ratio of the stiffness of contacts against sliding to that against sinking in. At 1, the
+        engine lets contacts creep that friction should hold.
     settle_s
         Time at each stop before lengths are measured, s.
+    pause_s
+        Time at each place on a leg before lengths are measured, s: the cable follows the robot.
     """
 
-    spacing: float = 0.12
-    ball_radius: float = 0.04
+    spacing: float = 0.08
+    radius: float = 0.05
     tension: float = 4.0
-    mass: float = 0.01
-    drag: float = 0.004
+    mass: float = 0.004
+    drag: float = 0.0027
+    normal_drag: float = 0.015
     speed: float = 0.8
     step_s: float = 0.004
+    contact_s: float = 0.008
+    tendon_s: float = 0.01
+    friction_stiffness: float = 10.0
     settle_s: float = 1.0
+    pause_s: float = 0.4
 
 
-def _contact(friction: float, kinds: str) -> str:
-    return f'friction="{friction} 0 0" condim="{3 if friction else 1}" {kinds}'
+def _contact(friction: float, contact_s: float, kinds: str) -> str:
+    return (
+        f'friction="{friction} 0 0" condim="{3 if friction else 1}" '
+        f'solref="{contact_s} 1" solimp="0.98 0.99 0.001" {kinds}'
+    )
 
 
-def geoms(scene: Scene, radius: float, friction: float, pieces: int = 48) -> list[str]:
-    """Return the solids of a scene as geoms of MuJoCo, thinner by `radius`."""
-    made = []
-    rub = _contact(friction, 'contype="1" conaffinity="2"')
+def geoms(scene: Scene, params: CableParams, friction: float, pieces: int = 48) -> list[str]:
+    """Return the solids of a scene as geoms of MuJoCo, thinner by the radius of the links."""
+    made, radius = [], params.radius
+    rub = _contact(friction, params.contact_s, 'contype="1" conaffinity="2"')
 
     def capsule(a: Any, b: Any, r: float) -> str:
         ends = " ".join(f"{v:.9g}" for v in (*a, *b))
@@ -125,51 +151,48 @@ class Cable:
         self.model = mujoco.MjModel.from_xml_string(self._xml(scene, friction))
         self.data = mujoco.MjData(self.model)
         self.first = self.count - 1
-        """First ball that is off the drum; the last is the robot's."""
+        """First node that is off the drum; the last is the robot's."""
         self.model.tendon_range[:, 1] = 1e3
         mujoco.mj_forward(self.model, self.data)
 
     def _xml(self, scene: Scene, friction: float) -> str:
-        p, (x, y, z) = self.params, self.anchor
+        p, nodes = self.params, range(self.count)
+        x, y, z = self.anchor
         place = f"{x:.9g} {y:.9g} {z:.9g}"
-        rub = (
-            f'friction="{friction} 0 0" condim="{3 if friction else 1}" contype="2" conaffinity="1"'
+        joints = "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
+        inertia = f'<inertial pos="0 0 0" mass="{p.mass}" diaginertia="1e-6 1e-6 1e-6"/>'
+        bodies = [
+            f'<body name="b{k}" pos="{place}">{joints}{inertia}<site name="s{k}"/></body>'
+            for k in nodes[:-1]
+        ]
+        bodies.append(
+            f'<body name="b{nodes[-1]}" mocap="true" pos="{place}"><site name="s{nodes[-1]}"/>'
+            "</body>"
         )
-        bodies, tendons = [], []
-        for k in range(self.count):
-            joints = "".join(
-                f'<joint type="slide" axis="{a}" damping="{p.drag}"/>'
-                for a in ("1 0 0", "0 1 0", "0 0 1")
-            )
-            if k == self.count - 1:
-                bodies.append(f'<body mocap="true" pos="{place}"><site name="s{k}"/></body>')
-            else:
-                bodies.append(
-                    f'<body pos="{place}">{joints}<geom type="sphere" size="{p.ball_radius}" '
-                    f'mass="{p.mass}" {rub}/><site name="s{k}"/></body>'
-                )
-            if k:
-                tendons.append(
-                    f'<spatial limited="true" range="0 {p.spacing}" '
-                    f'solreflimit="{2.5 * p.step_s} 1">'
-                    f'<site site="s{k - 1}"/><site site="s{k}"/></spatial>'
-                )
+        tendons = [
+            f'<spatial limited="true" range="0 {p.spacing}" solreflimit="{p.tendon_s} 1">'
+            f'<site site="s{k - 1}"/><site site="s{k}"/></spatial>'
+            for k in nodes[1:]
+        ]
+        rub = _contact(friction, p.contact_s, 'contype="2" conaffinity="1" selfcollide="none"')
+        flex = (
+            f'<flex name="cable" dim="1" radius="{p.radius}" '
+            f'body="{" ".join(f"b{k}" for k in nodes)}" vertex="{" ".join(["0 0 0"] * self.count)}"'
+            f' element="{" ".join(f"{k} {k + 1}" for k in nodes[:-1])}"><contact {rub}/></flex>'
+        )
         return (
             f'<mujoco><option timestep="{p.step_s}" gravity="0 0 0" integrator="implicitfast" '
+            f'cone="elliptic" impratio="{p.friction_stiffness}" '
             'solver="Newton" iterations="20" tolerance="1e-8"/>'
             '<compiler eulerseq="xyz" angle="degree"/><size memory="200M"/>'
-            f"<worldbody>{''.join(geoms(scene, p.ball_radius, friction))}{''.join(bodies)}"
-            f"</worldbody><tendon>{''.join(tendons)}</tendon></mujoco>"
+            f"<worldbody>{''.join(geoms(scene, p, friction))}{''.join(bodies)}</worldbody>"
+            f"<deformable>{flex}</deformable><tendon>{''.join(tendons)}</tendon></mujoco>"
         )
-
-    def balls(self) -> np.ndarray:
-        """Return the balls that are off the drum (n, 3)."""
-        moving = self.anchor + self.data.qpos.reshape(-1, 3)[self.first :]
-        return np.vstack([moving, self.data.mocap_pos[0]])
 
     def nodes(self) -> np.ndarray:
         """Return the cable from the anchor to the robot (n, 3)."""
-        return np.vstack([self.anchor, self.balls()])
+        moving = self.anchor + self.data.qpos.reshape(-1, 3)[self.first :]
+        return np.vstack([self.anchor, moving, self.data.mocap_pos[0]])
 
     def step(self) -> None:
         """Advance by one time step."""
@@ -182,7 +205,7 @@ class Cable:
             if self.first < last
             else np.linalg.norm(data.mocap_pos[0] - self.anchor)
         )
-        # a ball on the drum does not hold the next one: only the pull of the winch does
+        # a node on the drum does not hold the next one: only the pull of the winch does
         if out > 1.1 * p.spacing and self.first > 0:
             self.first -= 1
             self._hold(self.first, True)
@@ -197,10 +220,24 @@ class Cable:
             far = np.linalg.norm(way)
             force = p.tension * way / max(far, 0.02 * p.spacing)
             data.qfrc_applied.reshape(-1, 3)[self.first] = force
+        self._drag(speed)
         self._mujoco.mj_step(self.model, data)
 
+    def _drag(self, speed: np.ndarray) -> None:
+        """Add the drag on the links that are off the drum."""
+        p = self.params
+        if self.first == self.count - 1:
+            return
+        nodes = self.nodes()
+        along = nodes[2:] - nodes[:-2]
+        along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+        moving = speed[self.first :]
+        lengthwise = (moving * along).sum(axis=1)[:, None] * along
+        force = self.data.qfrc_applied.reshape(-1, 3)
+        force[self.first :] -= p.drag * lengthwise + p.normal_drag * (moving - lengthwise)
+
     def _hold(self, k: int, is_held: bool) -> None:
-        """Join ball k to the next one, or not."""
+        """Join node k to the next one, or not."""
         self.model.tendon_range[k, 1] = self.params.spacing if is_held else 1e3
 
     def stay(self, seconds: float) -> None:

@@ -299,6 +299,27 @@ def spoiled_meshes() -> tuple[str, bool]:
     return f"{100 * worst:.1f} points", bool(worst <= 0.02)
 
 
+def hanging() -> tuple[str, bool]:
+    """Recorded cables of the physics engine beside the bracket of the tether."""
+    import numpy as np
+    from cable import SHORT, beyond, bracket_of, recorded_flights
+
+    at_stops, on_legs, count = 0.0, 0.0, 0
+    for flight in recorded_flights():
+        bracket = bracket_of(flight, has_words=False)
+        is_stop = np.isin(np.arange(len(bracket.taut)), flight["stops"])
+        for cable in flight["cables"].values():
+            for places in (is_stop, ~is_stop):
+                worst = max(beyond(bracket, np.array(cable), places & (bracket.taut > SHORT)))
+                if places is is_stop:
+                    at_stops = max(at_stops, worst)
+                else:
+                    on_legs = max(on_legs, worst)
+            count += 1
+    shown = f"{100 * at_stops:.1f} % at visits, {100 * on_legs:.1f} % on legs, {count} cables"
+    return shown, at_stops <= 0.005 and on_legs <= 0.05 and count > 0
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("words: groups of seven scenes", "as known", groups)
@@ -310,6 +331,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("bounds in space: walls with slots", "none above a known tour", bounds)
     yield Claim("bounds in space: random scenes of eleven kinds", "none above a path or tour", law)
     yield Claim("meshes: holes, inside out, a soup, a sheet", "2 points", spoiled_meshes)
+    yield Claim("hanging tethers: recorded cables", "within 0.5 % at visits, 5 % on legs", hanging)
     yield solved("basin", 33.0, 25.0)
     yield solved("ring", 46.0, 15.0)
     yield solved("hull", 80.0, 35.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.field import DistanceField
 from netsp.world.tether.geodesic import GeodesicTether
@@ -39,4 +41,6 @@ def mission_tether(
     delta, friction = delta_ratio * mission.delta, mission.tether.friction
     if friction == 0.0:
         return GeodesicTether(field, delta)
-    return HoldingTether(field, delta, bracket=BracketPolicy(hold_friction=friction))
+    policy = BracketPolicy()
+    policy = replace(policy, hold_friction=friction, n_frictions=policy.n_planned_frictions)
+    return HoldingTether(field, delta, bracket=policy)

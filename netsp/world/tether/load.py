@@ -24,8 +24,8 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 from netsp.model.solution import tension_ratio
 from netsp.world.scene.sampling import Field
+from netsp.world.tether.drive import move_end
 from netsp.world.tether.measure import corner_excess
-from netsp.world.tether.pull import pull_end
 from netsp.world.tether.strand import EXTRA, X, Y, Z, gap, is_resting, strand_length
 from netsp.world.tether.taut_tether import Tether
 from netsp.world.tether.tether_policy import PullSettings, TetherPolicy
@@ -125,7 +125,7 @@ def drive_under(
     length."""
     payouts, turnings, residual = np.empty(len(path)), np.empty(len(path)), 0.0
     for k in range(len(path)):
-        strand, count, residual = pull_end(
+        strand, count, residual = move_end(
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )
         more = corner_excess(field, strand, count, settings)

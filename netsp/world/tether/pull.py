@@ -334,7 +334,9 @@ def slide_contacts(
     n = count - 2
     if n < 1:
         return 0.0, 1.0
-    slope, diagonal, beside, around = length_derivatives(strand, count, settings)
+    slope, diagonal, beside, pressing, around = length_derivatives(strand, count, settings)
+    if settings.hold_friction > 0.0:
+        resist_sliding(slope, diagonal, beside, pressing, settings.hold_friction)
     pull_along = slope.copy()
     eliminate(slope, diagonal, beside, settings.min_pivot_share)
     ahead = 0.0
@@ -373,13 +375,15 @@ def slide_contacts(
 @kernel
 def length_derivatives(
     strand: Floats, count: int, settings: PullSettings
-) -> tuple[Floats, Floats, Floats, Floats]:
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Return the derivatives of the length in the motions of inner nodes along their directions.
 
     Returns
     -------
     slope, diagonal, beside : ndarray, shape (n,)
         Gradient, diagonal and upper diagonal of the Hessian, which is tridiagonal.
+    pressing : ndarray, shape (n,)
+        Force that presses each node onto its surface, per unit of tension.
     around : ndarray, shape (n,)
         Sum of the lengths of both edges of each node, metres.
     """
@@ -421,9 +425,7 @@ def length_derivatives(
         diagonal[k] -= min(bend, settings.max_convex_share * diagonal[k])
         # a contact that is met head on cannot slide: a small weight keeps the system regular
         diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
-    if settings.hold_friction > 0.0:
-        resist_sliding(slope, diagonal, beside, pressing, settings.hold_friction)
-    return slope, diagonal, beside, around
+    return slope, diagonal, beside, pressing, around
 
 
 @kernel

@@ -2,15 +2,18 @@
 
 Where a tether may slip off the end of a body, its class has several locally shortest curves. The
 taut tether leaves one for another where the first ceases to exist. A cable may leave it earlier,
-because something shakes it, or later, because friction holds it. A taut tether never
-becomes shorter by more than its ends travel, except when it slips (docs/theory/tether). So each
-larger fall is a slip, and the two ends of the bracket differ from the taut length only near slips:
+because something shakes it, or later, because friction holds it. Friction also makes a cable longer
+where nothing slips: it does not slide sideways at once. The two ends of the bracket
+(docs/theory/tether):
 
-- at most: the tether before the slip is driven on with contacts that friction holds
-  (`netsp.world.tether.tether_policy.TetherPolicy.hold_friction`), until it slips, too;
-- at least: the tether after the slip is driven back along the path, for as long as it is shorter.
+- at most: the longest of several tethers that are driven beside the taut one with frictions up to
+  the largest that is assumed (`netsp.world.tether.tether_policy.TetherPolicy.hold_friction`). More
+  friction does not always make a tether longer, so one tether would not do;
+- at least: the shortest of them and of tethers that slip at once. A taut tether never becomes
+  shorter by more than its ends travel, except when it slips. So each larger fall is a slip, and the
+  tether after it is driven back along the path, for as long as it is shorter.
 
-Among upright prisms nothing slips, and both ends are the taut length.
+Where nothing bends the tether, both ends are the taut length.
 """
 
 from __future__ import annotations
@@ -27,8 +30,6 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.number_ranges import check_not_negative
 from netsp.world.tether.geodesic import GeodesicTether
 from netsp.world.tether.load import Load
-from netsp.world.tether.load import payout as payout_of
-from netsp.world.tether.load import turning as turning_of
 from netsp.world.tether.taut_tether import Tether
 
 
@@ -39,19 +40,22 @@ class BracketPolicy:
     Attributes
     ----------
     hold_friction
-        Largest coefficient of friction between the cable and what it hangs on. A cable with less
-        friction is assumed to slip no later.
+        Largest coefficient of friction between the cable and what it hangs on.
+    n_frictions
+        Number of tethers with friction that are driven beside the taut one, at equal steps of
+        friction up to the largest.
+    n_planned_frictions
+        Number of such tethers where planners, limits and the judge count the friction that a
+        mission states: fewer, because planners drive many tethers.
     min_slip_share
         Share of the length by which a tether must become shorter than its ends explain to count as
         slipping, and by which two tethers differ at least. The default is half of what reports
         show.
     min_slip
         The same in units of delta, for short tethers.
-    max_held
-        Maximum number of tethers that are assumed to hold at a time; the longest are kept.
     points_per_piece
-        Number of points that a held tether is driven at a time, before it is compared with the taut
-        tether.
+        Number of points that a shorter tether is driven at a time, before it is compared with the
+        taut tether.
     rest_rounds
         Maximum number of rounds in which a shortest path is pulled taut. Pulling ends when nothing
         moves, usually after about ten.
@@ -60,9 +64,10 @@ class BracketPolicy:
     """
 
     hold_friction: float = 0.4
+    n_frictions: int = 4
+    n_planned_frictions: int = 2
     min_slip_share: float = 0.005
     min_slip: float = 0.2
-    max_held: int = 3
     points_per_piece: int = 32
     rest_rounds: int = 300
     min_shown_share: float = 0.01
@@ -73,7 +78,7 @@ class BracketPolicy:
 
 @dataclass(frozen=True, eq=False)
 class HangingTether(Tether):
-    """Tether that may hang otherwise than the taut one, because friction may still hold it.
+    """Tether that may hang otherwise than the taut one, because friction holds it.
 
     Its strand is that of the taut tether; its length is the length that it has at most.
 
@@ -82,7 +87,7 @@ class HangingTether(Tether):
     taut_length : float
         Length of the taut tether, metres.
     held : tuple of Tether
-        Tethers that friction may hold, each longer than the taut one.
+        Tethers with friction, one for each friction of the model.
     """
 
     taut_length: float = 0.0
@@ -100,7 +105,7 @@ class LengthBracket:
     taut
         Length of the taut tether.
     upper
-        Length that the tether has at most: friction holds it for as long as it can.
+        Length that the tether has at most, with any friction up to the largest.
     """
 
     lower: Floats
@@ -112,8 +117,7 @@ class LengthBracket:
 class HoldingTether(GeodesicTether):
     """Model of a taut tether whose length is the one that it has at most.
 
-    Where nothing slips, it is the model `GeodesicTether`. After a slip, the length is that of the
-    longest tether that friction may still hold.
+    That is the longest of the taut tether and of those with friction.
 
     Parameters
     ----------
@@ -135,13 +139,27 @@ class HoldingTether(GeodesicTether):
     bracket: BracketPolicy = dataclass_field(default_factory=BracketPolicy)
 
     @cached_property
-    def _holding(self) -> GeodesicTether:
-        policy = replace(self.policy, hold_friction=self.bracket.hold_friction)
-        return GeodesicTether(self.field, self.delta, self.precision, self.rounds, policy)
+    def _holding(self) -> tuple[GeodesicTether, ...]:
+        count, largest = self.bracket.n_frictions, self.bracket.hold_friction
+        return tuple(
+            GeodesicTether(
+                self.field,
+                self.delta,
+                self.precision,
+                self.rounds,
+                replace(self.policy, hold_friction=largest * (k + 1) / count),
+            )
+            for k in range(count)
+        )
 
     def _slack(self, length: float) -> float:
         """Return the difference of two lengths from which on they count as different, metres."""
         return max(self.bracket.min_slip_share * length, self.bracket.min_slip * self.delta)
+
+    def _with_friction(self, tether: Tether) -> list[tuple[GeodesicTether, Tether]]:
+        """Return the models with friction and their tethers; those of a taut tether are itself."""
+        held = held_tethers(tether) or (tether,) * len(self._holding)
+        return list(zip(self._holding, held, strict=True))
 
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
@@ -163,12 +181,8 @@ class HoldingTether(GeodesicTether):
             As `GeodesicTether.update`.
         """
         taut = super().update(tether, robot, anchor)
-        before = taut_length(tether)
-        travelled = float(np.linalg.norm(taut.robot - tether.robot))
-        travelled += float(np.linalg.norm(taut.anchor - tether.anchor))
-        is_slipping = before - taut.length - travelled > self._slack(before)
-        strands = [*held_tethers(tether), *([tether] if is_slipping else [])]
-        return self._hanging(taut, [self._holding.update(h, robot, anchor) for h in strands])
+        held = [m.update(h, robot, anchor) for m, h in self._with_friction(tether)]
+        return _hanging(taut, held)
 
     def drive(
         self, tether: Tether, path: npt.ArrayLike, floor: float = 0.0
@@ -190,25 +204,11 @@ class HoldingTether(GeodesicTether):
             As `GeodesicTether.drive`.
         """
         taut, lengths = super().drive(tether, path, floor)
-        points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
-        held = held_tethers(tether)
-        slips = self._slips(tether, points, lengths)
-        if not held and not slips:
-            return taut, lengths
-        upper, remaining = lengths.copy(), []
-        strands, state, at = [(0, h) for h in held], tether, 0
-        for j, _ in slips:
-            state = GeodesicTether.drive(self, state, points[at:j])[0] if j > at else state
-            at = j
-            strands.append((j, state))
-        for start, first in strands:
-            end, longer = self._held_along(first, points[start:], lengths[start:], floor)
-            upper[start : start + len(longer)] = np.maximum(
-                upper[start : start + len(longer)], longer
-            )
-            if end is not None:
-                remaining.append(end)
-        return self._hanging(taut, remaining), upper
+        if len(lengths) == 0:
+            return tether, lengths
+        driven = [m.drive(h, path, floor) for m, h in self._with_friction(tether)]
+        upper = np.max([lengths, *(found for _, found in driven)], axis=0)
+        return _hanging(taut, [held for held, _ in driven]), upper
 
     def drive_under(
         self, tether: Tether, path: npt.ArrayLike, load: Load
@@ -235,20 +235,12 @@ class HoldingTether(GeodesicTether):
             Largest sum of turning angles at each point, radians.
         """
         taut, payouts, turnings = super().drive_under(tether, path, load)
-        points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
-        if len(points) == 0:
+        if len(payouts) == 0:
             return tether, payouts, turnings
-        if not held_tethers(tether):
-            lengths = super().drive(tether, points)[1]
-            if not self._slips(tether, points, lengths):
-                return taut, payouts, turnings
-        payouts, turnings = payouts.copy(), turnings.copy()
-        for k, point in enumerate(points):
-            tether = self.update(tether, point)
-            payouts[k] = max(payouts[k], payout_of(tether, load))
-            for held in held_tethers(tether):
-                turnings[k] = max(turnings[k], turning_of(held, self.delta))
-        return self._hanging(taut, held_tethers(tether)), payouts, turnings
+        driven = [m.drive_under(h, path, load) for m, h in self._with_friction(tether)]
+        payouts = np.max([payouts, *(d[1] for d in driven)], axis=0)
+        turnings = np.max([turnings, *(d[2] for d in driven)], axis=0)
+        return _hanging(taut, [d[0] for d in driven]), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:
         """Return the tether after pulling until nothing moves, with its held tethers at rest.
@@ -258,8 +250,10 @@ class HoldingTether(GeodesicTether):
         tether : Tether
             Tether before; it is not changed.
         """
-        held = [self._holding.refine(h) for h in held_tethers(tether)]
-        return self._hanging(super().refine(tether), held)
+        taut = super().refine(tether)
+        if not held_tethers(tether):
+            return taut
+        return _hanging(taut, [m.refine(h) for m, h in self._with_friction(tether)])
 
     def along(
         self,
@@ -296,13 +290,14 @@ class HoldingTether(GeodesicTether):
         >>> model = HoldingTether(Scene(solids=[post]).field(), 0.1)
         >>> path = [(2, y, 0) for y in np.arange(0.6, -1, -0.1)]
         >>> found = model.along(model.start((-2, 0.6, 0), (2, 0.6, 0)), path)
-        >>> bool((found.lower == found.upper).all())
+        >>> bool(np.allclose(found.lower, found.upper, rtol=1e-4))
         True
         """
         points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
+        tether = Tether(tether.strand, taut_length(tether), tether.residual)
         taut = GeodesicTether.drive(self, tether, points)[1]
-        upper = self.drive(Tether(tether.strand, taut_length(tether), tether.residual), points)[1]
-        lower = taut.copy()
+        lengths = [taut, *(m.drive(tether, points)[1] for m in self._holding)]
+        upper, lower = np.max(lengths, axis=0), np.min(lengths, axis=0)
         candidates = list((shorter or {}).items())
         for _, k in self._slips(tether, points, taut):
             state = GeodesicTether.drive(self, tether, points[: k + 1])[0]
@@ -335,26 +330,6 @@ class HoldingTether(GeodesicTether):
                 highest, is_falling = k, True
         return slips
 
-    def _held_along(
-        self, tether: Tether, points: Floats, lengths: Floats, floor: float
-    ) -> tuple[Tether | None, Floats]:
-        """Return a held tether at the end of a path, None if it slips before, and its lengths until
-        then."""
-        longer: list[Floats] = []
-        for k in range(0, len(points), self.bracket.points_per_piece):
-            piece = slice(k, k + self.bracket.points_per_piece)
-            tether, found = self._holding.drive(tether, points[piece], floor)
-            slack = np.maximum(
-                self.bracket.min_slip_share * lengths[piece], self.bracket.min_slip * self.delta
-            )
-            is_merged = found <= lengths[piece] + slack
-            # a tether begins to be held where it is still the taut one
-            is_merged &= np.arange(k, k + len(found)) > 0
-            longer.append(found)
-            if is_merged[-1]:
-                return None, np.concatenate(longer)
-        return tether, np.concatenate(longer) if longer else np.empty(0)
-
     def _lower_along(self, tether: Tether, points: Floats, k: int, lower: Floats) -> None:
         """Drive a shorter tether at point k along the path to both sides, while it is shorter."""
         gain = float(lower[k]) - tether.length
@@ -374,20 +349,13 @@ class HoldingTether(GeodesicTether):
                     return
                 lower[at] = length
 
-    def _hanging(self, taut: Tether, held: Sequence[Tether]) -> Tether:
-        """Return the taut tether with the held tethers that differ from it and from one another."""
-        kept: list[Tether] = []
-        for other in sorted(held, key=lambda h: -h.length):
-            nearest = kept[-1].length if kept else np.inf
-            if (
-                other.length > taut.length + self._slack(taut.length)
-                and other.length < nearest - self._slack(taut.length)
-                and len(kept) < self.bracket.max_held
-            ):
-                kept.append(Tether(other.strand, other.length, other.residual))
-        if not kept:
-            return taut
-        return HangingTether(taut.strand, kept[0].length, taut.residual, taut.length, tuple(kept))
+
+def _hanging(taut: Tether, held: Sequence[Tether]) -> Tether:
+    """Return the taut tether with its tethers with friction, if anything bends one of them."""
+    if not held or all(len(t.strand) == 2 for t in (taut, *held)):
+        return taut
+    longest = max(taut.length, *(h.length for h in held))
+    return HangingTether(taut.strand, longest, taut.residual, taut.length, tuple(held))
 
 
 def taut_length(tether: Tether) -> float:
@@ -408,7 +376,7 @@ def taut_length(tether: Tether) -> float:
 
 
 def held_tethers(tether: Tether) -> tuple[Tether, ...]:
-    """Return the tethers that friction may hold, the longest first.
+    """Return the tethers with friction, by friction; none if nothing bends the tether.
 
     Parameters
     ----------

@@ -104,7 +104,12 @@ class TetherPolicy:
     hold_friction
         Coefficient of friction with which contacts resist sliding sideways. A contact slides only
         if the pull along its slide direction exceeds this share of what presses it, and a rim
-        releases the strand later by the same angle. 0 is the taut tether without friction.
+        releases the strand later by the same angle. While tether is paid out or reeled in, contacts
+        nevertheless creep sideways (`netsp.world.tether.contact_creep`). 0 is the taut tether
+        without friction.
+    max_creep_pieces
+        Maximum number of steps in which contacts creep in one update. Each step is at most a
+        stride; with a longer travel, contacts creep less far than they would.
     """
 
     min_pressed_share: float = 0.5
@@ -135,6 +140,7 @@ class TetherPolicy:
     max_crumpled_ratio: float = 1.1
     min_piece: float = 0.3
     hold_friction: float = 0.0
+    max_creep_pieces: int = 200
 
     def __post_init__(self) -> None:
         check_not_negative(self)
@@ -190,6 +196,7 @@ class PullSettings(NamedTuple):
     max_crumpled_ratio: float
     min_piece: float
     hold_friction: float
+    max_creep_pieces: int
 
 
 def pull_settings(
