@@ -481,7 +481,7 @@ class StageTimePolicy:
     growth_share: float = 0.5
     solve_share: float = 0.5
     early_solve_share: float = 0.1
-    surround_share: float = 0.3
+    surround_share: float = 0.06
     min_growth_s: float = 1.0
     min_solve_s: float = 0.5
     max_solves: int = 20

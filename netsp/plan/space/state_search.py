@@ -208,12 +208,21 @@ class StateSearch:
             self.is_complete = (has_homes and has_grown) or self.is_complete
             is_last = max_per_place == self.effort.states[-1]
             share = times.solve_share if is_last else times.early_solve_share
-            yield from self._solve(clock, share, options)
+            yield from self._solve(clock, share, options if is_last else self._fast_options)
             yield from self._surround_tours(clock)
             if clock.planned_left < clock.elapsed - begin:
                 if not is_last and not self._is_optimal:
                     yield from self._solve(clock, times.solve_share, options)
                 break
+
+    @property
+    def _fast_options(self) -> dict[str, Any]:
+        """Return the options of the solver while states are still added: with legs that are not
+        driven, there are so many that a proof takes longer than adding more."""
+        options = self.run.options
+        if not self.growth.by_words or options["solver"] != "auto":
+            return options
+        return {**options, "solver": FAST_SOLVER}
 
     def _update_board(self, clock: Clock) -> bool:
         """Give the legs so far to the board; return whether there was time for all paths from the
@@ -230,9 +239,6 @@ class StateSearch:
         some solids. States around it hold the tours that pass one of them otherwise.
         """
         policy, run = self.run.context.policy.states, self.run
-        options = run.options
-        if options["solver"] == "auto":
-            options = {**options, "solver": FAST_SOLVER}
         while self.growth.by_words and self.best is not None and not clock.is_up:
             room = policy.max_with_surrounding - len(self.states.entries)
             run.on_progress("states around the tour")
@@ -240,7 +246,7 @@ class StateSearch:
             if not self.growth.surround(tour, count, clock):
                 return
             self._update_board(clock)
-            yield from self._solve(clock, run.times.surround_share, options)
+            yield from self._solve(clock, run.times.surround_share, self._fast_options)
 
     @property
     def _is_optimal(self) -> bool:
