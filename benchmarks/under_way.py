@@ -335,10 +335,11 @@ def main() -> None:
     parser.add_argument("--cpu-s", type=float, default=math.inf, help="CPU time for new runs, s")
     args = parser.parse_args()
     runs = list(runs_of(args))
+    origin = {"commit": " and ".join(sorted({f.commit for f, _ in runs}))} if runs else {}
     heading("Under way")
     head("what happens", "runs", "scenes", "home", "free", "over the limit", "in a solid",
          "visited", "out of reach", "no room", "lost", "tether and string differ by at most",
-         "CPU s a run", name="under-way")  # fmt: skip
+         "CPU s a run", name="under-way", **origin)  # fmt: skip
     for kind in args.kinds:
         flights = [f for f, _ in runs if f.kind == kind and f.refused is None]
         v = [v for f, v in runs if f.kind == kind and f.refused is None]
