@@ -333,7 +333,9 @@ def claims() -> Iterator[Claim]:
     yield Claim("bounds in space: walls with slots", "none above a known tour", bounds)
     yield Claim("bounds in space: random scenes of eleven kinds", "none above a path or tour", law)
     yield Claim("meshes: holes, inside out, a soup, a sheet", "2 points", spoiled_meshes)
-    yield Claim("hanging tethers: ring, comb, frame", "within 0.5 % at visits, 5 % on legs", hanging)
+    yield Claim(
+        "hanging tethers: ring, comb, frame", "within 0.5 % at visits, 5 % on legs", hanging
+    )
     yield solved("basin", 33.0, 25.0)
     yield solved("ring", 46.0, 15.0)
     yield solved("hull", 80.0, 35.0)
