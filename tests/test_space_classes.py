@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.plan.space.class_bound import add_windings, packed_windings
-from netsp.plan.space.core_detours import detour_lengths
+from netsp.plan.space.core_detours import DetourEffort, detour_lengths
 from netsp.plan.space.mission_policy import ClassPolicy, PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.places import Places
@@ -127,10 +127,12 @@ def test_the_bound_over_a_bar_across_is_the_path_at_its_distance(x, height, away
     a, b = np.zeros(3), np.array([4.0, 0.0, 0.0])
     begin, end = np.array([[x, height, -5.0]]), np.array([[x, height, 5.0]])
     tilt = np.array([[0.0, lean, 0.0]])
-    bound = detour_lengths(a, b, begin, end, np.array([away]), 20.0, 1e-3)[0]
+    bound = detour_lengths(a, b, begin, end, np.array([away]), DetourEffort(20.0, 1e-3, 20_000))[0]
     exact = math.hypot(x, height + away) + math.hypot(4.0 - x, height + away)
     assert exact - 1e-3 - 1e-9 <= bound <= exact + 1e-9
-    lower = detour_lengths(a, b, begin - tilt, end + tilt, np.array([away]), 20.0, 1e-3)[0]
+    lower = detour_lengths(
+        a, b, begin - tilt, end + tilt, np.array([away]), DetourEffort(20.0, 1e-3, 20_000)
+    )[0]
     assert 4.0 <= lower <= exact + 1e-9
 
 
@@ -151,7 +153,9 @@ def test_no_path_that_winds_otherwise_is_shorter_than_its_bound(seed):
     a, b = path[:-1].repeat(len(ends), axis=0), path[1:].repeat(len(ends), axis=0)
     gaps = closest_points(a, b, np.tile(ends[:, 0], (3, 1)), np.tile(ends[:, 1], (3, 1)))[2]
     away = gaps.reshape(3, -1).min(0)
-    bounds = detour_lengths(path[0], path[3], ends[:, 0], ends[:, 1], away, 99.0, 1e-3)
+    bounds = detour_lengths(
+        path[0], path[3], ends[:, 0], ends[:, 1], away, DetourEffort(99.0, 1e-3, 20_000)
+    )
     assert bounds.min() <= np.linalg.norm(np.diff(path, axis=0), axis=1).sum() + 1e-9
 
 

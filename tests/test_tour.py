@@ -3,6 +3,7 @@
 import json
 import signal
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from netsp.command.main import main
 from netsp.model.solution import Status
 from netsp.plan.space.flown import words_of_flight
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
+from netsp.plan.space.mission_solver import add_bound, seconds_until_home, solve_mission
 from netsp.plan.space.path_bound import bound_all_tours
 from netsp.plan.space.space_plan import plan
 from netsp.world.mission.mission import Mission
@@ -145,10 +146,53 @@ def test_a_flight_in_other_classes_is_told(solved):
     assert not run.summary["home"]["tether_free"]
 
 
+def test_a_bound_above_the_tour_is_left_out_and_not_shortened_to_it(solved):
+    mission, found = solved
+    field, tour = mission.load_scene().field(), found.tour
+    visited = frozenset(found.order[: len(tour.stops)])
+    assert found.shortfall == pytest.approx(0.0, abs=1e-9)
+    assert add_bound(found, {visited: 1.001 * tour.length}, field) is None
+    rounded = add_bound(found, {visited: tour.length * (1.0 + 1e-9)}, field)
+    assert rounded is not None
+    assert rounded.tour.bound_of_all == tour.length
+    assert rounded.tour.status is Status.OPTIMAL
+    lower = add_bound(found, {visited: 0.5 * tour.length}, field)
+    assert lower is not None
+    assert lower.tour.gap_to_all == pytest.approx(0.5)
+
+
+def test_a_bound_is_reduced_for_a_robot_that_turns_back_and_left_out_where_it_has_less_room(solved):
+    mission, found = solved
+    field, tour = mission.load_scene().field(), found.tour
+    visited = frozenset(found.order[: len(tour.stops)])
+    stop = tour.stops[0]
+    end = np.array(stop.path[-1])
+    after = tour.stops[1].path
+    cut = end + 0.05 * (np.array(stop.path[-2]) - end) / np.linalg.norm(end - stop.path[-2])
+
+    def turned_back_at(point):
+        stops = (
+            stop.model_copy(update={"path": (*stop.path[:-1], tuple(point))}),
+            tour.stops[1].model_copy(update={"path": (tuple(point), *after[1:])}),
+            *tour.stops[2:],
+        )
+        planned = found.mission.model_copy(
+            update={"tour": tour.model_copy(update={"stops": stops, "bound_of_all": None})}
+        )
+        return replace(found, mission=planned)
+
+    bounded = add_bound(turned_back_at(cut), {visited: 0.9 * tour.length}, field)
+    assert bounded is not None
+    assert bounded.tour.bound_of_all == pytest.approx(0.9 * tour.length - 0.1)
+    # as if the leg ended in the post: led on to the waypoint, it keeps too little room
+    inside = turned_back_at((3.0, 0.4, -1.0))
+    assert add_bound(inside, {visited: 0.9 * tour.length}, field) is inside
+
+
 def test_the_judge_accepts_what_was_solved(solved):
     verdict = verify_mission(solved[1].mission)
     assert verdict, str(verdict)
-    assert verify_mission(solved[1].plan.to_mission(bound=solved[1].tour.bound_of_all))
+    assert verify_mission(solved[1].plan.to_mission())
 
 
 def changed(mission: Mission, **tour) -> Mission:

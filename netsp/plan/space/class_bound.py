@@ -22,7 +22,7 @@ from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import NetspError
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.core_detours import detour_lengths
+from netsp.plan.space.core_detours import DetourEffort, detour_lengths
 from netsp.plan.space.mission_policy import ClassPolicy
 from netsp.plan.space.potential import BOUND_ROUNDING
 from netsp.plan.space.reduced_leg_costs import ReducedCosts
@@ -154,7 +154,8 @@ class WindingLegs:
         ends = cores.points[cores.edges]
         a, b, away = self.points[u], self.points[v], np.maximum(0.0, cores.depth + room)
         begins, ends = ends[:, 0], ends[:, 1]
-        lengths = detour_lengths(a, b, begins, ends, away, longest, self.policy.tolerance)
+        effort = DetourEffort(longest, self.policy.tolerance, self.policy.max_pieces)
+        lengths = detour_lengths(a, b, begins, ends, away, effort)
         order = [int(e) for e in np.argsort(lengths, kind="stable") if self._bars[e]]
         bounds, seen = {0: Detour(on_all)}, set[int]()
         for e in order:

@@ -9,25 +9,35 @@ least |aq| + |qb| long. The kernels bound the least such length over all p of a 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 
-MAX_PIECES = 20_000
-"""Format of a bound: number of pieces of a segment after which the bound proven so far is taken."""
+
+class DetourEffort(NamedTuple):
+    """Effort of bounds on detours.
+
+    Attributes
+    ----------
+    longest
+        Longest bound of interest, metres.
+    tolerance
+        Amount by which a bound may be less than it could be, metres.
+    max_pieces
+        Number of pieces of a segment after which the bound proven so far is taken.
+    """
+
+    longest: float
+    tolerance: float
+    max_pieces: int
 
 
 @kernel
 def detour_lengths(
-    a: Floats,
-    b: Floats,
-    begins: Floats,
-    ends: Floats,
-    distances: Floats,
-    longest: float,
-    tolerance: float,
+    a: Floats, b: Floats, begins: Floats, ends: Floats, distances: Floats, effort: DetourEffort
 ) -> Floats:
     """Return lower bounds on paths from a to b around segments of cores.
 
@@ -39,28 +49,27 @@ def detour_lengths(
         Ends of the segments, metres.
     distances : ndarray of shape (m,)
         Least distance of the paths from each segment, metres; not negative.
-    longest : float
-        Longest bound of interest, metres.
-    tolerance : float
-        Amount by which a bound may be less than it could be, metres.
+    effort : DetourEffort
+        Longest bound of interest, and accuracy.
 
     Returns
     -------
     ndarray of shape (m,)
         A bound for each segment, metres: paths with a point p of the segment between a point of
-        the path and the closest point of ab are no shorter. At most `longest`.
+        the path and the closest point of ab are no shorter. At most the longest of interest.
     """
     out = np.empty(len(begins))
     for k in range(len(begins)):
-        out[k] = _segment_bound(a, b, begins[k], ends[k], distances[k], longest, tolerance)
+        out[k] = _segment_bound(a, b, begins[k], ends[k], distances[k], effort)
     return out
 
 
 @kernel
 def _segment_bound(
-    a: Floats, b: Floats, c: Floats, d: Floats, away: float, longest: float, tolerance: float
+    a: Floats, b: Floats, c: Floats, d: Floats, away: float, effort: DetourEffort
 ) -> float:
     """Return the least bound over all pieces of a segment."""
+    longest = effort.longest
     straight = _distance(a, b)
     if straight >= longest:
         return longest
@@ -82,8 +91,8 @@ def _segment_bound(
         bound = max(straight, value - 2.0 * half * length)
         pieces += 1
         if (
-            bound >= min(found - tolerance, longest)
-            or pieces > MAX_PIECES
+            bound >= min(found - effort.tolerance, longest)
+            or pieces > effort.max_pieces
             or count + 2 > len(stack)
             or half * length < 1e-9
         ):

@@ -217,6 +217,47 @@ class PotentialPolicy:
 
 
 @dataclass(frozen=True)
+class EdgePolicy:
+    """Effort of the lower bound on the length of one leg around edges of polytopes.
+
+    Attributes
+    ----------
+    sides
+        Number of sides of the polygons that stand for circles, a multiple of 4. More sides make a
+        stronger bound, and take more time: with n sides, a path around a circle loses a share of
+        1.6 / n² of its length there.
+    max_edges
+        Maximum number of edges; polytopes that are farther from a leg are left out.
+    max_pieces
+        Maximum number of pieces of edges; about the square of it in pairs are looked at, of eight
+        bytes each.
+    max_rounds
+        Maximum number of searches for a shortest path over pieces; after each, the pieces on the
+        path are halved.
+    min_piece
+        Length of a piece that is not halved any more, metres.
+    tolerance
+        Relative gap between the bound and the path on its pieces at which the bound is final.
+    """
+
+    sides: int = 12
+    max_edges: int = 800
+    max_pieces: int = 2000
+    max_rounds: int = 200
+    min_piece: float = 2e-3
+    tolerance: float = 5e-4
+
+    def __post_init__(self) -> None:
+        check_not_negative(self)
+        _check_minimum(self, sides=4, max_edges=1, max_pieces=2, max_rounds=1)
+        if self.sides % 4:
+            raise InputError(f"sides: {self.sides}; expected a multiple of 4")
+        for name in ("min_piece", "tolerance"):
+            if not getattr(self, name) > 0.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected more than 0")
+
+
+@dataclass(frozen=True)
 class BoundPolicy:
     """Time and accuracy of a bound on all tours.
 
@@ -280,6 +321,14 @@ class ClassPolicy:
         windings to look at.
     tolerance
         Amount by which the bound on a detour may be less than it could be, metres; more than 0.
+    max_pieces
+        Number of pieces of a bar after which the bound on a detour proven so far is taken.
+    sagitta_share
+        Largest distance between a chord of a ring and its arc, as a share of the radius about the
+        arc; more than 0. Shorter chords weaken the bound less and take more time.
+    min_loop_depths
+        A joint of two bars is left out if it closes a loop no longer than this multiple of its
+        depth, which encloses no passage. The bound holds without any joint.
     max_segments
         Number of segments of bars and rings from which on no loops are searched for, because the
         search would take too long.
@@ -302,6 +351,9 @@ class ClassPolicy:
     max_leg_windings: int = 243
     max_tether_windings: int = 2187
     tolerance: float = 2e-3
+    max_pieces: int = 20_000
+    sagitta_share: float = 0.02
+    min_loop_depths: float = 8.0
     max_segments: int = 1500
     hub_samples: int = 33
     max_tips: int = 20
@@ -315,6 +367,8 @@ class ClassPolicy:
             max_states=1,
             max_leg_windings=1,
             max_tether_windings=1,
+            max_pieces=1,
+            min_loop_depths=0.0,
             max_segments=1,
             hub_samples=2,
             max_tips=1,
@@ -322,8 +376,9 @@ class ClassPolicy:
         )
         if not self.max_raise_ratio > 0.0:
             raise InputError(f"max_raise_ratio: {self.max_raise_ratio}; expected more than 0")
-        if not self.tolerance > 0.0:
-            raise InputError(f"tolerance: {self.tolerance}; expected more than 0")
+        for name in ("tolerance", "sagitta_share"):
+            if not getattr(self, name) > 0.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected more than 0")
 
 
 @dataclass(frozen=True)

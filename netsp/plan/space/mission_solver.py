@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,7 @@ from netsp.plan.space.mission_flights import (
 from netsp.plan.space.mission_policy import MissionPolicy
 from netsp.plan.space.passages import GapResolution
 from netsp.plan.space.path_bound import bound_all_tours
-from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.space_plan import (
     AS_GIVEN,
     OUT_AND_BACK,
@@ -59,7 +60,7 @@ from netsp.plan.space.upright import bound_by_upright_solids
 from netsp.plan.space.visit_order import order_by_going_on
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_tether
-from netsp.world.mission.planned_tour import status_of_tour
+from netsp.world.mission.planned_tour import bound_within_rounding, status_of_tour
 from netsp.world.scene.field import DistanceField
 from netsp.world.scene.scene import Scene
 
@@ -302,9 +303,10 @@ class _MissionRun:
     def _is_proven(self) -> bool:
         """Return whether the bound on all tours proves the incumbent."""
         best = self.incumbents.best
-        return best is not None and (
-            _add_bound(best, self.searched.bounds).tour.status is Status.OPTIMAL
-        )
+        if best is None:
+            return False
+        bounded = add_bound(best, self.searched.bounds, self.context.field)
+        return bounded is not None and bounded.tour.status is Status.OPTIMAL
 
     def _offer_plans(self, plans: Iterator[SpacePlan], round_: Clock | None = None) -> None:
         """Offer plans one after the other, and bound all tours to their waypoints."""
@@ -336,7 +338,14 @@ class _MissionRun:
                 "waypoints: no tour was found whose tether stays within the limit all along"
             )
         incumbents.fly_best()
-        best = _add_bound(incumbents.best, searched.bounds)
+        best = incumbents.best
+        bounded = add_bound(best, searched.bounds, self.context.field)
+        if bounded is None:
+            self.on_progress(
+                "the bound on all tours is left out: the tour is shorter, so the bound is wrong; "
+                "please report this mission as a bug"
+            )
+        best = bounded or best
         return replace(
             best,
             mission=with_gaps(best.mission, self.context),
@@ -455,17 +464,37 @@ def _solved_from_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMissi
     return SolvedMission(mission, planned.all_waypoints, None, None, planned)
 
 
-def _add_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
+def add_bound(
+    best: SolvedMission, bounds: Mapping[frozenset[int], float], field: DistanceField
+) -> SolvedMission | None:
     """Return a tour with the bound on all tours to the same waypoints, if there is one.
 
     A robot may turn back before it is at a waypoint. So the bound is reduced by twice the distance
-    that remains at each waypoint, and once at home.
+    that remains at each waypoint, and once at home. It holds only if the legs, led on to the
+    waypoints, keep the room of these.
+
+    Parameters
+    ----------
+    bounds : dict
+        Bounds on all tours through a set of waypoints, metres, by the set.
+    field : DistanceField
+        Distance field of the scene.
+
+    Returns
+    -------
+    SolvedMission or None
+        The same tour if there is no bound that holds for it; None if the tour is shorter than its
+        bound, so that the bound is wrong.
     """
-    bound = bounds.get(frozenset(best.order[: len(best.tour.stops)]))
-    if bound is None:
-        return best
+    found = bounds.get(frozenset(best.order[: len(best.tour.stops)]))
     tour, mission, shortfall = best.tour, best.mission, best.shortfall
-    bound = min(tour.length, max(0.0, bound - (shortfall if shortfall > LENGTH_ROUNDING else 0.0)))
+    if shortfall <= LENGTH_ROUNDING:
+        shortfall = 0.0
+    if found is None or (shortfall and not _keeps_room_to_waypoints(best, field)):
+        return best
+    bound = bound_within_rounding(tour.length, max(0.0, found - shortfall))
+    if bound is None:
+        return None
     is_complete = len(tour.stops) == len(mission.waypoints)
     tour = tour.model_copy(
         update={
@@ -475,6 +504,18 @@ def _add_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> S
         }
     )
     return replace(best, mission=mission.model_copy(update={"tour": tour}))
+
+
+def _keeps_room_to_waypoints(best: SolvedMission, field: DistanceField) -> bool:
+    """Return whether all legs, led on to the waypoints themselves, keep as much room as the judge
+    asks of a leg between these."""
+    mission, tour = best.mission, best.tour
+    paths = [*(np.array(stop.path) for stop in tour.stops), np.array(tour.home)]
+    places = np.vstack([paths[0][0], mission.places[: len(tour.stops)], mission.start])
+    return all(
+        keeps_clearance(field, np.vstack([a, path, b]), mission)
+        for (a, b), path in zip(pairwise(places), paths, strict=True)
+    )
 
 
 def _offer_going_on(incumbents: Incumbents, clock: Clock, seed: int) -> None:

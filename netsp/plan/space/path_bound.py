@@ -1,10 +1,11 @@
 """Certified lower bound on every tour of a mission's waypoints.
 
 Each leg gets a certified lower bound: the straight distance, which is exact between places in
-sight of one another, or the bound of a potential over all cells that are not certain to be blocked
-(`netsp.plan.space.potential`). The shortest tour by these lengths is a lower bound on every tour.
-The length of a path that was found, pulled taut or not, only says how far to look: a path found on
-a grid is no bound on other paths.
+sight of one another, the shortest path around polytopes inside of the solids
+(`netsp.plan.space.edge_bound`), or the bound of a potential over all cells that are not certain to
+be blocked (`netsp.plan.space.potential`). The shortest tour by these lengths is a lower bound on
+every tour. The length of a path that was found, pulled taut or not, only says how far to look: a
+path found on a grid is no bound on other paths.
 
 These lengths ignore the tether. If a scene has upright solids, the plane's proof over all homotopy
 classes of the tether around them is a second bound (`netsp.plan.space.upright`). If bars or rings
@@ -25,7 +26,9 @@ from netsp.base.clock import Clock
 from netsp.base.geometry import polylines
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.class_bound import bound_by_windings
-from netsp.plan.space.mission_policy import BoundPolicy, ClassPolicy, PotentialPolicy
+from netsp.plan.space.edge_bound import edge_bound
+from netsp.plan.space.inscribed_polytopes import Polytopes, inscribed_polytopes
+from netsp.plan.space.mission_policy import BoundPolicy, ClassPolicy, EdgePolicy, PotentialPolicy
 from netsp.plan.space.planning_context import is_straight_clear
 from netsp.plan.space.potential import Ends, Region, cells_at_level, path_bound
 from netsp.plan.space.space_legs import RobotPaths
@@ -114,8 +117,8 @@ class LegBounds:
         Known paths between waypoints.
     place_numbers
         Numbers of the places, as in `paths.places`.
-    potential, policy
-        Effort for each leg; time and accuracy.
+    potential, policy, edges
+        Effort for each leg by potentials; time and accuracy; effort for each leg by edges.
     points
         (v, 3) the start, then the places, metres.
     costs
@@ -128,11 +131,13 @@ class LegBounds:
     place_numbers: list[int]
     potential: PotentialPolicy
     policy: BoundPolicy = field(default_factory=BoundPolicy)
+    edges: EdgePolicy = field(default_factory=EdgePolicy)
     points: Floats = field(init=False)
     costs: Floats = field(init=False)
     final: Bools = field(init=False)
     _level: Ints = field(init=False)
     _is_sight_tested: Bools = field(init=False)
+    _polytopes: dict[float, Polytopes] = field(default_factory=dict)
     _clearance: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -147,7 +152,9 @@ class LegBounds:
         self._clearance = context.field.distance(self.points)
 
     def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
-        """Raise the bound of a leg on a finer grid, and return whether it has grown.
+        """Raise the bound of a leg, and return whether it has grown.
+
+        The first time around edges of polytopes, later by potentials on ever finer grids.
 
         Parameters
         ----------
@@ -168,18 +175,39 @@ class LegBounds:
         known_length = self._known_length(u, v)
         farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
         longest = known_length if math.isfinite(known_length) else farthest
-        level = int(self._level[u, v]) + 1
+        ends, region, level = Ends(a, b, longest), self._region(u, v), int(self._level[u, v])
+        if level == 0:
+            length, is_final = edge_bound(self._shapes(region), ends, region, self.edges, clock)
+            self._keep(u, v, length, 1)
+            if is_final or length >= (1.0 - self.policy.max_leg_gap) * longest:
+                self.final[u, v] = self.final[v, u] = True
+            return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
         cells = cells_at_level(level, self.potential)
         if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
-        ends = Ends(a, b, longest)
-        length = path_bound(context.field, ends, self._region(u, v), cells, self.potential, clock)
-        self.costs[u, v] = self.costs[v, u] = max(before, length)
-        self._level[u, v] = self._level[v, u] = level
+        length = path_bound(context.field, ends, region, cells, self.potential, clock)
+        self._keep(u, v, length, level + 1)
         if cells >= self.potential.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:
             self.final[u, v] = self.final[v, u] = True
         return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
+
+    def _keep(self, u: int, v: int, length: float, level: int) -> None:
+        """Keep a bound on a leg if it is greater than the one before, and the level it was made
+        at."""
+        self.costs[u, v] = self.costs[v, u] = max(self.costs[u, v], length)
+        self._level[u, v] = self._level[v, u] = level
+
+    def _shapes(self, region: Region) -> Polytopes:
+        """Return polytopes that all paths in a region stay out of."""
+        if region.room not in self._polytopes:
+            reach = np.array([-region.reach, region.reach])[:, None]
+            low, high = region.anchor + reach
+            box = np.array([np.maximum(low, region.bounds[0]), np.minimum(high, region.bounds[1])])
+            self._polytopes[region.room] = inscribed_polytopes(
+                self.paths.context.field, region.room, box, self.edges
+            )
+        return self._polytopes[region.room]
 
     def room(self, u: int, v: int) -> float:
         """Return the least distance from solids of all paths that the judge accepts, metres.

@@ -204,6 +204,15 @@ class PlanningContext:
         """Return the gaps that the grid does not show, as in a tour; None if not searched for."""
         return None if self.gaps is None else self.gaps.as_in_tour
 
+    @property
+    def max_dip(self) -> float:
+        """Return the depth to which the judge lets paths and tethers enter solids, metres.
+
+        A tether does so between its nodes, whose distance is at least a voxel among voxels.
+        """
+        delta = max(self.mission.delta, self.model.delta)
+        return max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * delta)
+
     @cached_property
     def start_tether(self) -> Tether:
         """Return the tether with the robot at the start."""

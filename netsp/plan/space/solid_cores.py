@@ -21,10 +21,6 @@ from netsp.world.scene.field import DistanceField
 from netsp.world.scene.packing import ROW, ROWS
 from netsp.world.scene.solids import solid_distance
 
-SAGITTA_SHARE = 0.02
-"""Format of ring cores: largest distance between a chord and its arc, as a share of the radius
-about the arc. Shorter chords weaken the bound less and take more time."""
-
 MAX_SHIFT = 1e-4
 """Tolerance for nodes, metres: each is moved at random by up to this distance, so that straight
 segments between waypoints of a symmetric scene do not meet cores."""
@@ -34,10 +30,6 @@ OVERLAP_TOLERANCE = 1.1 * MAX_SHIFT
 
 MERGE_DISTANCE = 1e-7
 """Tolerance for nodes, metres: nearer ones are the same node. Less than a tenth of `MAX_SHIFT`."""
-
-LOOP_DEPTHS = 8.0
-"""Format of joints: a joint is left out if it closes a loop no longer than this multiple of its
-depth, which encloses no passage worth a letter. A bound holds without any joint."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +109,7 @@ def solid_cores(field: DistanceField, dip: float, policy: ClassPolicy = ClassPol
     lines: list[_Lines] = []
     hubs: list[int] = []
     for n, (kind, row) in enumerate(solid_rows(field)):
-        core = _core(kind, row, offset)
+        core = _core(kind, row, offset, policy.sagitta_share)
         if core is not None and core.depth > min_depth:
             lines.append(core)
         elif kind in (solids.HALF_SPACE, solids.BOX):
@@ -131,10 +123,10 @@ def solid_cores(field: DistanceField, dip: float, policy: ClassPolicy = ClassPol
         graph.join_in_hub(
             _deepest(graph, field.arrays.data, n, offset, min_depth, policy.hub_samples)
         )
-    return graph.cores(policy.seed)
+    return graph.cores(policy)
 
 
-def _core(kind: int, row: Floats, offset: float) -> _Lines | None:
+def _core(kind: int, row: Floats, offset: float, sagitta_share: float) -> _Lines | None:
     """Return the core of a bar or ring; None for other solids."""
     if kind == solids.CAPSULE:
         return _Lines(row[None, :3].copy(), row[None, 3:6].copy(), float(row[6]) + offset)
@@ -146,7 +138,7 @@ def _core(kind: int, row: Floats, offset: float) -> _Lines | None:
         return _Lines(begin[None], end[None], spare + offset)
     if kind == solids.TORUS:
         bend, radius, angle = float(row[9]), float(row[10]), float(row[11])
-        half = math.acos(max(-1.0, 1.0 - SAGITTA_SHARE * radius / bend))
+        half = math.acos(max(-1.0, 1.0 - sagitta_share * radius / bend))
         count = max(4, math.ceil(0.5 * angle / half))
         t = np.linspace(0.0, angle, count + 1)[:, None]
         side = np.cross(row[3:6], row[6:9])
@@ -199,7 +191,7 @@ class _Graph:
         for node, depth in nodes[1:]:
             self.joints.append((nodes[0][0], node, min(nodes[0][1], depth)))
 
-    def cores(self, seed: int) -> Cores:
+    def cores(self, policy: ClassPolicy) -> Cores:
         """Return the graph whose segments end at nodes; nodes at the same point are one."""
         points = np.array(self.nodes)
         number = _merged(points)
@@ -217,9 +209,10 @@ class _Graph:
                 keep(a, b, float(depth))
         for a, b, depth in self.joints:
             joint = keep(a, b, depth)
-            if joint is not None and _is_tiny_loop(points, kept, joint, LOOP_DEPTHS * depth):
+            longest = policy.min_loop_depths * depth
+            if joint is not None and _is_tiny_loop(points, kept, joint, longest):
                 del kept[joint]
-        shifts = np.random.default_rng(seed).uniform(-0.5, 0.5, points.shape) * MAX_SHIFT
+        shifts = np.random.default_rng(policy.seed).uniform(-0.5, 0.5, points.shape) * MAX_SHIFT
         edges = np.array(list(kept), dtype=np.int64).reshape(-1, 2)
         return Cores(points + shifts, edges, np.array([*kept.values()]) - MAX_SHIFT)
 

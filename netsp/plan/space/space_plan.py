@@ -148,9 +148,7 @@ class SpacePlan:
             1.0 + (self.context.policy.bound_worth if has_bound else 0.0)
         )
 
-    def to_mission(
-        self, solver: str = "auto", seed: int = 0, bound: float | None = None
-    ) -> Mission:
+    def to_mission(self, solver: str = "auto", seed: int = 0) -> Mission:
         """Return the mission with the tour, and its waypoints in the order of the tour; waypoints
         that no tether reaches come last.
 
@@ -160,13 +158,8 @@ class SpacePlan:
             Name of the solver that was used.
         seed : int
             Its random seed.
-        bound : float, optional
-            Bound on all tours (`netsp.plan.space.path_bound`), metres.
         """
         result = self.result
-        if bound is not None:
-            # legs of the bound are pulled taut more finely than those of the tour
-            bound = min(bound, self.length)
         tour = PlannedTour(
             stops=tuple(
                 PlannedVisit(
@@ -180,15 +173,13 @@ class SpacePlan:
             ),
             home=thinned_path(self.home),
             status=status_of_tour(
-                self.length, result.lower_bound, bound, is_complete=not self.unreached
+                self.length, result.lower_bound, None, is_complete=not self.unreached
             ),
             solver=solver if self.kind in (TAUT_LEGS, TAUT_SO_FAR, DETOURS) else self.kind,
             seed=seed,
             length=self.length,
             lower_bound=result.lower_bound,
             gap=relative_gap(self.length, result.lower_bound),
-            bound_of_all=bound,
-            gap_to_all=relative_gap(self.length, bound),
             states=self.states,
             legs=self.legs,
             exact=self.context.words.exact if self.context.has_words else None,

@@ -23,12 +23,7 @@ from netsp.plan.solve_problem import solve, solve_graph
 from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import (
-    CLEARANCE_TOLERANCE,
-    DEPTH_TOLERANCE,
-    DIP_RATIO,
-    PlanningContext,
-)
+from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, PlanningContext
 from netsp.plan.space.potential import BOUND_ROUNDING
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.travel_graph import TravelGraph
@@ -61,10 +56,9 @@ def bound_by_upright_solids(
         place_numbers
     ):
         return None
-    # the judge accepts paths that dip into solids a little, and tethers that do so between their
-    # nodes: among obstacles shrunk by the larger depth, both are free, and the taut tether is no
-    # longer than its model
-    dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * mission.delta)
+    # among obstacles shrunk by this depth, paths and tethers that the judge accepts are free, and
+    # the taut tether is no longer than its model
+    dip = context.max_dip
     obstacles = upright_obstacles(context, dip)
     if not obstacles or clock.is_up:
         return None

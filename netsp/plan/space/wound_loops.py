@@ -16,9 +16,9 @@ import numpy as np
 from netsp.base.arrays import Floats, Ints
 from netsp.base.clock import Clock
 from netsp.plan.space.class_bound import TourLeg, WindingGraph, WindingLegs
-from netsp.plan.space.core_detours import detour_lengths
+from netsp.plan.space.core_detours import DetourEffort, detour_lengths
 from netsp.plan.space.mission_policy import ClassPolicy
-from netsp.plan.space.planning_context import DEPTH_TOLERANCE, DIP_RATIO, PlanningContext
+from netsp.plan.space.planning_context import PlanningContext
 from netsp.plan.space.reduced_leg_costs import reduced_leg_costs
 from netsp.plan.space.solid_cores import Cores, solid_cores
 from netsp.plan.space.winding_numbers import Loops, costliest_loop, piercings
@@ -76,8 +76,7 @@ class WoundLoops:
         points : ndarray of shape (v, 3)
             The start, then the places, metres.
         """
-        # the judge lets paths and tethers enter solids by this depth
-        dip = max(2.0 * DEPTH_TOLERANCE, DIP_RATIO * context.mission.delta)
+        dip = context.max_dip
         cores = solid_cores(context.field, dip, policy).loops()
         if not len(cores.edges):
             return None
@@ -163,5 +162,6 @@ class WoundLoops:
         ends = self.cores.points[self.cores.edges]
         away = np.maximum(0.0, self.cores.depth + room)
         longest = min(longest, 1e3 * float(np.ptp(self.points, axis=0).max()) + 1.0)
-        a, b, tolerance = self.points[u], self.points[v], self.policy.tolerance
-        return detour_lengths(a, b, ends[:, 0], ends[:, 1], away, longest, tolerance)
+        effort = DetourEffort(longest, self.policy.tolerance, self.policy.max_pieces)
+        a, b = self.points[u], self.points[v]
+        return detour_lengths(a, b, ends[:, 0], ends[:, 1], away, effort)

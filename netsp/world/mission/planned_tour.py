@@ -56,6 +56,30 @@ def _within(gap: Any) -> bool:
     return isinstance(gap, int | float) and gap <= OPTIMALITY_TOLERANCE
 
 
+def bound_within_rounding(length: float, bound: float) -> float | None:
+    """Return a bound on all tours that is at most the length of a tour; None if it is wrong.
+
+    A tour that is shorter than a bound by more than rounding refutes the bound.
+
+    Parameters
+    ----------
+    length : float
+        Length of a tour that the judge accepts, metres.
+    bound : float
+        Bound on all tours, metres.
+
+    Examples
+    --------
+    >>> bound_within_rounding(10.0, 10.0 + 1e-9)
+    10.0
+    >>> bound_within_rounding(10.0, 10.1) is None
+    True
+    """
+    if bound > length * (1.0 + OPTIMALITY_TOLERANCE):
+        return None
+    return min(bound, length)
+
+
 def status_of_tour(
     length: float, of_states: float | None, of_all: float | None, *, is_complete: bool = True
 ) -> Status:
