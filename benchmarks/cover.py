@@ -1,12 +1,13 @@
 """Waypoints that see a structure, flown: tour and viewpoints chosen together, beside the fewest
-viewpoints and then their tour; and the tour of others about the same cloud.
+viewpoints and then their tour, of fewer and of the same candidates; and the tour of others about
+the same cloud.
 
     python benchmarks/cover.py [--structures ring hull …] [--limit S] [--resume FILE]
                                [--external FOLDER] [--keep] [--cpu-limits]
 
-Both ways have the same scene, camera, tether and limits of time. Waypoints are flown in the order
-that `netsp cover` writes, by the planner that keeps the tether; with `--limit`, `netsp solve` plans
-a tour before. The external cloud and its tour
+All ways have the same scene, camera, tether and limits of time, and the same search for the order
+of their waypoints. Waypoints are flown in the order that `netsp cover` writes, by the planner that
+keeps the tether; with `--limit`, `netsp solve` plans a tour before. The external cloud and its tour
 (FC-Planner's, 347 waypoints) are read where they are present.
 """
 
@@ -20,11 +21,12 @@ from typing import Any
 
 import numpy as np
 from react import external_mission
-from sites import mission_of
+from sites import mission_of, shipped
 from table import ROOT, head, heading, row
 
 from netsp.base.geometry import polylines
 from netsp.plan.cover import Cover, cover
+from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.space.mission_solver import seconds_until_home, solve_mission
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
@@ -32,13 +34,20 @@ from netsp.world.mission.mission import Mission
 from netsp.world.simulator.mission_run import simulate
 
 CAMERA: dict[str, Any] = {"camera": Camera(range=2.5, patch=0.25), "standoff": 1.2}
-SITES = ("ring", "linked rings", "hull", "comb", "tunnel")
+JACKET: dict[str, Any] = {"camera": Camera(range=4.0, patch=0.3), "standoff": 2.0}
+STRUCTURES = ("ring", "linked rings", "hull", "tunnel", "jacket", "external")
+DENSE = CoverPolicy(dense_objectives=("time", "viewpoints"))
 EXTERNAL = ROOT.parent / "shared" / "data" / "fc_planner_pipe"
-WAYS = {"viewpoints": "fewest, then tour", "time": "together"}
+WAYS = {
+    "fewest, then tour": {"objective": "viewpoints"},
+    "fewest of all candidates, then tour": {"objective": "viewpoints", "policy": DENSE},
+    "together": {"objective": "time", "policy": DENSE},
+}
 COLUMNS = (
     "structure", "chosen", "candidates", "visible %", "waypoints", "of the visible %",
-    "placed in s", "solved in s", "flown m", "home after s", "less time %",
-    "of the visible, flown %", "over s", "free", "visited",
+    "tour, as estimated s", "placed in s", "solved in s", "flown m", "home after s",
+    "less than the first %", "less than the second %", "of the visible, flown %", "over s", "free",
+    "visited",
 )  # fmt: skip
 
 
@@ -79,14 +88,16 @@ def placed(mission: Mission, scene: Scene, **how: Any) -> tuple[Cover, dict[str,
         "visible %": f"{100 * found.visible:.1f}",
         "waypoints": str(len(found.viewpoints)),
         "of the visible %": f"{100 * found.seen / found.visible:.1f}",
+        "tour, as estimated s": f"{found.tour_s:.0f}",
         "placed in s": f"{took_s:.0f}",
     }
 
 
 class Rows:
-    """Rows of the table, with those of a run before."""
+    """Rows of the table, with those of a run before, and changes of the missions to fly."""
 
     def __init__(self, resumed: Path | None) -> None:
+        self.changes: dict[str, Any] = {}
         self.resumed = resumed
         is_there = resumed is not None and resumed.exists()
         self.kept: dict[str, dict[str, Any]] = json.loads(resumed.read_text()) if is_there else {}
@@ -106,26 +117,28 @@ class Rows:
 def compared(
     name: str, mission: Mission, scene: Scene, limit_s: float, rows: Rows, **how: Any
 ) -> dict[str, Any]:
-    """Cover a structure both ways, and return the last cells."""
-    before: dict[str, Any] = {}
-    for objective, chosen in WAYS.items():
+    """Cover a structure in all ways, and return the last cells."""
+    before: list[dict[str, Any]] = []
+    for chosen, way in WAYS.items():
         if before:
-            how["tether_length"] = before["tether"]
+            how["tether_length"] = before[0]["tether"]
 
-        def measure(objective: str = objective, before: dict[str, Any] = before) -> dict[str, Any]:
-            found, cells = placed(mission, scene, objective=objective, **how)
-            cells |= flown(found.mission, scene, found.visible, limit_s)
-            if before:
-                ratio = float(cells["home after s"]) / float(before["home after s"])
-                cells["less time %"] = f"{100 * (1 - ratio):.0f}"
+        def measure(way: dict[str, Any] = way) -> dict[str, Any]:
+            found, cells = placed(mission, scene, **way, **how)
+            there = found.mission.model_copy(update=rows.changes)
+            cells |= flown(there, scene, found.visible, limit_s)
+            names = ("less than the first %", "less than the second %")
+            for column, other in zip(names, before, strict=False):
+                ratio = float(cells["home after s"]) / float(other["home after s"])
+                cells[column] = f"{100 * (1 - ratio):.0f}"
             return {**cells, "tether": found.mission.tether_length, "visible": found.visible}
 
-        before = rows.measure(name, chosen, measure)
-    return before
+        before.append(rows.measure(name, chosen, measure))
+    return before[-1]
 
 
 def external_pipe(mission: Mission, scene: Scene, limit_s: float, rows: Rows) -> None:
-    """Cover the external pipe both ways, and fly FC-Planner's waypoints beside."""
+    """Cover the external pipe in all ways, and fly FC-Planner's waypoints beside."""
     ours = compared(
         "external pipe",
         mission,
@@ -148,7 +161,7 @@ def external_pipe(mission: Mission, scene: Scene, limit_s: float, rows: Rows) ->
 def main() -> None:
     """Run what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--structures", nargs="*", default=[*SITES, "external"])
+    parser.add_argument("--structures", nargs="*", default=STRUCTURES)
     parser.add_argument("--limit", type=float, default=0.0, help="solve each for these seconds")
     parser.add_argument("--resume", type=Path, help="file of the rows that are measured")
     parser.add_argument("--external", type=Path, default=EXTERNAL, help="folder of FC-Planner's")
@@ -157,7 +170,13 @@ def main() -> None:
     head(*COLUMNS, name="cover")
     rows = Rows(args.resume)
     for name in args.structures:
-        if name != "external":
+        if name == "jacket":
+            mission, scene = shipped(name)
+            how = {"clearance": mission.clearance, "inspect": mission.inspect, **JACKET}
+            rows.changes = {name: getattr(mission, name) for name in ("cell", "delta", "reach")}
+            compared("a leg of the jacket", mission, scene, args.limit, rows, **how)
+            rows.changes = {}
+        elif name != "external":
             compared(name, *mission_of(name), args.limit, rows, **CAMERA)
         elif args.external.is_dir():
             external_pipe(*external(args.external), args.limit, rows)

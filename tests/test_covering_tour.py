@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,23 +10,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.base.clock import Clock
+from netsp.base.compiled.interpretation import interpreted
 from netsp.base.errors import InputError
 from netsp.plan.cover import cover
+from netsp.plan.cover.arrival_turns import expected_turns
 from netsp.plan.cover.cover_policy import CoverPolicy, TourSearchPolicy
-from netsp.plan.cover.covering_tour import TourProblem, cheapest_tour
+from netsp.plan.cover.covering_rounds import RoundSettings, search_rounds
+from netsp.plan.cover.covering_tour import TourProblem, cheapest_tour, shortest_order
+from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.tour_choice import TourChooser
 from netsp.plan.cover.tour_improvement import nearest_neighbour_tour, shorten, tour_length
 from netsp.plan.cover.viewpoint_distances import are_clear, estimate_distances, neighbour_pairs
 from netsp.plan.cover.viewpoints import Viewer, Viewpoints, coarsen, find_more_viewpoints
 from netsp.world import Scene
 from netsp.world.mission.equipment import Camera
+from netsp.world.paths.tree import Grid
 from netsp.world.simulator.coverage import Coverage, surface_patches
 
 CAMERA = Camera(range=2.5, patch=0.25)
 WALL = Scene(name="wall", solids=[{"box": {"center": [0, 0, -3], "size": [0.2, 4, 20]}}])
 BALL = Scene(name="ball", solids=[{"sphere": {"center": [0, 0, -4], "radius": 0.8}}],
              bounds=[-6, -6, -9, 6, 6, 0])  # fmt: skip
-FEW_ROUNDS = CoverPolicy(max_candidates=500, tours=TourSearchPolicy(max_rounds=300))
+FEW_ROUNDS = CoverPolicy(max_candidates=300, tours=TourSearchPolicy(max_rounds=300))
 
 POINTS = st.lists(st.tuples(st.floats(0, 9), st.floats(0, 9)), min_size=2, max_size=9)
 
@@ -184,6 +190,83 @@ def test_a_visit_costs_the_turn_from_the_nearest_patch():
     straight, aside = chooser.visit_times(found)
     assert straight == pytest.approx(0.15)
     assert aside - straight == pytest.approx(1.0)
+    free = Viewpoints(places, np.full(2, np.nan), np.zeros((2, 1), dtype=bool))
+    assert chooser.visit_times(free).tolist() == [0.0, 0.0]
+
+
+def test_a_turn_is_left_where_another_wall_is_nearest_on_the_way():
+    walls = Scene(name="walls", solids=[
+        {"box": {"center": [x, 0, -3], "size": [0.2, 6, 20]}} for x in (-2.0, 2.0)
+    ])  # fmt: skip
+    viewer = viewer_of(walls)
+    x = np.array([0.1, 0.5, 1.0])
+    places = np.column_stack([x, 0 * x, 0 * x - 3.0])
+    arrival, _ = viewer.arrival_headings(places)
+    between, aside, far = expected_turns(viewer, places, arrival, 0.4)
+    # of 26 directions, nine lead across the middle; the robot turns on for the rest of its way
+    assert between > aside > far == 0.0
+    assert 0.2 * math.pi < between < 9 / 26 * math.pi
+    assert expected_turns(viewer, places, np.full(3, np.nan), 0.4).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_without_a_heading_only_what_any_heading_shows_counts():
+    viewer, rng = viewer_of(BALL), np.random.default_rng(2)
+    for place in ([0.0, 0.0, -1.9], [0.2, -0.1, -6.2]):
+        seen = viewer.seen_from(np.array(place), math.nan)
+        assert seen.sum() > 10
+        for heading in rng.uniform(-math.pi, math.pi, 12):
+            missed = seen & ~viewer.seen_from(np.array(place), float(heading))
+            assert missed.sum() <= 0.03 * seen.sum()
+    assert not viewer.seen_from(np.array([2.0, 0.0, -4.0]), math.nan).any()
+
+
+def test_legs_that_stay_in_their_class_have_an_empty_word():
+    torus = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2.0, "minor_radius": 0.3}
+    scene, anchor = Scene(solids=[{"torus": torus}]), np.array([3.5, 0.0, 2.0])
+    grid = Grid(scene.field(), [-4] * 3, [4] * 3, 0.25, 0.3)
+    classes, rng = TetherClasses.on_grid(grid, anchor), np.random.default_rng(4)
+    a, b = rng.uniform(-3.9, 3.9, (2, 300, 3))
+    is_free = grid.field.grown(0.3).line_of_sight
+    legs = [(p, q) for p, q in zip(a, b, strict=True) if is_free(p, q)]
+    stays = classes.stay(*(np.array(ends) for ends in zip(*legs, strict=True)))
+    is_empty = np.array([classes.water.word(np.array(leg)) == () for leg in legs])
+    assert not (stays & ~is_empty).any()
+    # a leg may leave its class and come back to it
+    assert (is_empty & ~stays).sum() <= 0.05 * len(legs)
+    assert 10 < stays.sum() < len(legs) - 5
+    viewer = viewer_of(scene)
+    # the shortest tethers to these ends lead through the ring and past it
+    ends = np.array([[0.0, 0.0, -1.0], [3.2, 0.0, -1.0]])
+    straight, around = (
+        estimate_distances(viewer, ends, classes=known)[0, 1] for known in (None, classes)
+    )
+    assert straight == pytest.approx(3.2)
+    assert around > 4.0
+
+
+def test_rounds_are_the_same_interpreted_and_compiled():
+    problem, policy = problem_of(5, 25, 60), TourSearchPolicy()
+    settings_ = RoundSettings(*(getattr(policy, name) for name in RoundSettings._fields))
+    results = []
+    for run in (interpreted(search_rounds), search_rounds):
+        tour, state = np.arange(26), np.array([77], dtype=np.uint64)
+        current, best, idle = run(problem.arrays(), settings_, tour, tour, (0, 30), state)
+        results.append((current.tolist(), best.tolist(), int(idle), int(state[0])))
+    assert results[0] == results[1]
+    assert problem.cost(np.array(results[0][1])) < problem.cost(np.arange(26))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_shortest_order_is_that_of_all_orders(seed):
+    distances = distances_of(np.random.default_rng(seed).uniform(0, 9, (8, 2)))
+    places = np.array([1, 3, 4, 5, 6, 7])
+    tour = shortest_order(distances, places, np.random.default_rng(seed), Clock())
+    assert tour[0] == 0
+    assert sorted(tour[1:]) == places.tolist()
+    shortest = min(
+        tour_length(distances, np.array([0, *order])) for order in itertools.permutations(places)
+    )
+    assert tour_length(distances, tour) == pytest.approx(shortest)
 
 
 def test_together_is_faster_than_the_fewest_and_sees_the_share():
@@ -197,13 +280,19 @@ def test_together_is_faster_than_the_fewest_and_sees_the_share():
     assert any("m with" in line for line in told)
     look = Coverage(together.patches, BALL.field(), CAMERA)
     for waypoint in together.mission.waypoints:
-        look.look(np.array(waypoint.position), math.radians(waypoint.heading))
+        # without a heading, any heading shows enough
+        look.look(np.array(waypoint.position), math.radians(waypoint.heading or 0.0))
     assert look.share >= 0.985 * together.visible
     places = np.vstack([together.mission.start, together.mission.places])
     straight = np.linalg.norm(places - np.roll(places, -1, axis=0), axis=1).sum()
     assert straight <= together.tour_length + 1e-3 * len(places)
     again = cover(BALL, time_limit=None, **how)
     assert again.mission == together.mission
+    policy = replace(FEW_ROUNDS, min_begun=1, max_views=1)
+    begun = cover(BALL, time_limit=None, on_progress=told.append, **{**how, "policy": policy})
+    assert any("fewest of" in line for line in told)
+    assert begun.seen >= 0.99 * begun.visible - 1e-9
+    assert begun.tour_s <= 0.9 * fewest.tour_s
 
 
 @pytest.mark.parametrize(

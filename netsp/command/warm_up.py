@@ -139,6 +139,8 @@ def steps() -> Iterator[Step]:
     from netsp.mip.program import Duals
     from netsp.online.fly.flight_rehearsal import rehearse
     from netsp.online.guard.guard_rehearsal import rehearse as rehearse_guard
+    from netsp.plan.cover import cover
+    from netsp.plan.cover.cover_policy import CoverPolicy, TourSearchPolicy
     from netsp.plan.random_worlds import random_world
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
@@ -260,6 +262,12 @@ def steps() -> Iterator[Step]:
             scene=scene,
             time_limit=None,
         ),
+    )
+
+    few_rounds = CoverPolicy(max_candidates=300, tours=TourSearchPolicy(max_rounds=20))
+    yield (
+        "waypoints of a structure in space",
+        partial(cover, scene, anchor=mission.anchor, camera=mission.camera, policy=few_rounds),
     )
 
     for in_space in (False, True):

@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.base.arrays import Bools, ComparesArrays, Floats
-from netsp.base.clock import TimeLimit
-from netsp.base.errors import InputError
+from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.clock import Clock, TimeLimit
+from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.base.interrupt_signals import until_interrupt
+from netsp.plan.cover.choose import choose, choose_greedily, merge_patches
 from netsp.plan.cover.cover_policy import CoverPolicy
+from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.tour_choice import TIME, VIEWPOINTS, Objective, TourChoice, TourChooser
 from netsp.plan.cover.viewpoint_swaps import find_alternatives
 from netsp.plan.cover.viewpoints import (
@@ -223,13 +225,62 @@ def cover(
                 "inspect: no part of the surface can be seen from where the robot can go; "
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
+        begun = None
         if objective == TIME:
+            begun = _begun(found, patches, share, clock, policy, report)
+        if objective in policy.dense_objectives:
             more_clock = clock.part(policy.more_time_share)
+            viewer, found = _counted_finely(viewer, found, fine, more_clock, report)
             found = find_more_viewpoints(viewer, found, more_clock, report)
-        chooser = TourChooser(viewer, start_place, mission.speed, share, clock, seed, report, fine)
-        choice = chooser.choose(found, objective)
+            patches = viewer.patches
+        classes = reach.tether_classes(clock)
+        chooser = TourChooser(
+            viewer, start_place, mission.speed, share, clock, seed, report, fine, classes
+        )
+        choice = chooser.choose(found, objective, begun)
         counted = share_seen(replace(viewer, patches=fine), found.subset(choice.order))
         return _build_cover(mission, patches, found, choice, counted, reach, share, objective)
+
+
+def _begun(
+    found: Viewpoints,
+    patches: Patches,
+    share: float,
+    clock: Clock,
+    policy: CoverPolicy,
+    on_progress: Callable[[str], None],
+) -> Ints | None:
+    """Return the fewest viewpoints, with which the search for a tour begins if they are many; None
+    if they are not."""
+    matrix, weights = merge_patches(found.sees, patches.areas)
+    greedy = choose_greedily(matrix, weights, share * float(weights.sum()))
+    if len(greedy) < policy.min_begun:
+        return None
+    on_progress(f"fewest of {len(found)} viewpoints")
+    return choose(found.sees, patches.areas, share, clock.part(policy.begun_time_share)).chosen
+
+
+def _counted_finely(
+    viewer: Viewer,
+    found: Viewpoints,
+    fine: Patches,
+    clock: Clock,
+    on_progress: Callable[[str], None],
+) -> tuple[Viewer, Viewpoints]:
+    """Return a viewer of finer patches, with what viewpoints see of these.
+
+    These are the patches that a flight counts, or coarser ones if these are too many. If all are
+    too many, or the clock is up before all viewpoints are counted, the viewer is returned as it is.
+    """
+    policy = viewer.policy
+    for ratio in policy.counted_ratios:
+        patches = coarsen(fine, ratio * viewer.camera.patch) if ratio > 0.0 else fine
+        if len(patches.areas) * policy.max_candidates <= policy.max_views:
+            on_progress(f"counting what viewpoints see of {len(patches.areas)} patches")
+            finer_viewer = replace(viewer, patches=patches)
+            counted = finer_viewer.views(found.places, found.headings, clock)
+            return (finer_viewer, counted) if len(counted) == len(found) else (viewer, found)
+    return viewer, found
 
 
 def _check(
@@ -316,6 +367,16 @@ class _Reach:
             is_allowed[near] = lengths <= limit
         return is_allowed
 
+    def tether_classes(self, clock: Clock) -> TetherClasses | None:
+        """Return the classes of tethers; None if the complex has no labels in time."""
+        anchor = np.array(self.mission.anchor)
+        try:
+            return clock.bounded(
+                "labelling the water", lambda: TetherClasses.on_grid(self.grid, anchor)
+            )
+        except (InputError, LimitReachedError):
+            return None
+
     def tethers(self, places: Floats) -> Floats:
         """Return the shortest tethers (n,) to places (n, 3), metres; inf where there is none."""
         anchor = np.array(self.mission.anchor)
@@ -378,4 +439,5 @@ def _build_cover(
 
 def _viewpoint(found: Viewpoints, k: int) -> Viewpoint:
     x, y, z = found.places[k].round(4).tolist()
-    return Viewpoint(position=(x, y, z), heading=round(math.degrees(found.headings[k]), 1))
+    heading = math.degrees(found.headings[k])
+    return Viewpoint(position=(x, y, z), heading=None if math.isnan(heading) else round(heading, 1))

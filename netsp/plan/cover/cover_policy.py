@@ -17,6 +17,8 @@ class TourSearchPolicy:
     ----------
     max_rounds
         Maximum number of rounds.
+    rounds_per_visit
+        Number of rounds for each visit of the first tour, if these are more than the maximum.
     idle_rounds_per_visit
         Number of rounds without a gain after which the search ends, for each place of the tour
         (its visits and the start).
@@ -45,12 +47,15 @@ class TourSearchPolicy:
         Cost above that of the current tour up to which a round goes on, in mean costs of a visit.
     rounds_per_report
         Number of rounds between two lines about the progress.
+    rounds_per_check
+        Number of rounds between two looks at the clock, and the number of rounds in a kernel.
     warmth
         Increase of the cost that is accepted with a probability of 1/e in the first round, in mean
         costs of a visit. It falls to 0 in the last round.
     """
 
     max_rounds: int = 5_000
+    rounds_per_visit: int = 60
     idle_rounds_per_visit: int = 50
     min_gain: float = 1e-4
     max_removed: int = 12
@@ -66,6 +71,7 @@ class TourSearchPolicy:
     rounding: float = 1e-12
     max_detour: float = 1.5
     rounds_per_report: int = 500
+    rounds_per_check: int = 20
     warmth: float = 0.1
 
     def __post_init__(self) -> None:
@@ -107,8 +113,18 @@ class CoverPolicy:
         multiples of the stand-off. None is farther than the camera sees.
     heading_offsets_deg
         Angles between their headings and the straight look at a patch, degrees.
+    free_headings
+        Number of headings with which a patch must be seen from a viewpoint without a heading. It is
+        odd, because a view straight down repeats after a quarter turn.
     max_candidates
         Maximum number of viewpoints that such a tour chooses among.
+    counted_ratios
+        Sizes of the patches on which the area is counted for such a tour, as multiples of those of
+        the camera, the finest first; 0 for the patches that a flight counts.
+    max_views
+        Maximum number of such patches times that of viewpoints; coarser patches are taken then.
+    dense_objectives
+        Objectives for which the choice is among these viewpoints: `time`, `viewpoints` or both.
     max_sight_lines
         Maximum number of straight legs between viewpoints that are checked for solids.
     samples_per_clearance
@@ -123,6 +139,9 @@ class CoverPolicy:
     free_turn_deg
         Turn at a viewpoint straight above or below the surface, where the heading on arrival is not
         known, degrees.
+    approach_times
+        Times before the arrival at a viewpoint at which the robot's heading is estimated, s. They
+        reach back as far as the longest turn, of half a circle, takes.
     visit_steps
         Time of a visit without a turn, in steps of the flight: the rest of the step in which the
         robot arrives, half a step on average, and the step in which it looks.
@@ -131,6 +150,13 @@ class CoverPolicy:
     max_recounts
         Number of searches for such a tour, each with more area than the one before as long as less
         than the share is seen of the fine patches that a flight counts.
+    min_begun
+        Number of viewpoints of a greedy cover from which on the search for such a tour begins with
+        the fewest ones; fewer are found by the search itself.
+    begun_time_share
+        Share of the remaining time for the choice of these.
+    recount_rounds
+        Maximum number of rounds of each of these searches after the first.
     tours
         Policy of the search for a covering tour.
     """
@@ -148,24 +174,37 @@ class CoverPolicy:
     max_places: int = 150
     standoff_ratios: tuple[float, ...] = (0.7, 1.0, 1.4, 1.8)
     heading_offsets_deg: tuple[float, ...] = (0.0,)
-    max_candidates: int = 3000
+    free_headings: int = 7
+    max_candidates: int = 4000
+    counted_ratios: tuple[float, ...] = (0.0, 0.5)
+    max_views: int = 400_000_000
+    dense_objectives: tuple[str, ...] = ("time",)
     max_sight_lines: int = 150_000
     samples_per_clearance: float = 2.0
     sparse_neighbours: int = 16
     turning_ratios: tuple[float, ...] = (1.05, 2.0)
     blocked_ratio: float = 1.5
     free_turn_deg: float = 60.0
+    approach_times: tuple[float, ...] = (0.4, 0.8, 1.6, 2.4)
     visit_steps: float = 1.5
     max_recounts: int = 4
+    min_begun: int = 150
+    begun_time_share: float = 0.25
+    recount_rounds: int = 500
     more_time_share: float = 0.3
     tours: TourSearchPolicy = TourSearchPolicy()
 
     def __post_init__(self) -> None:
         check_positive(self)
-        for name in ("search_time_share", "max_tether_share", "more_time_share"):
+        for name in (
+            "search_time_share",
+            "max_tether_share",
+            "more_time_share",
+            "begun_time_share",
+        ):
             if getattr(self, name) > 1.0:
                 raise InputError(f"{name}: expected a share up to 1, got {getattr(self, name)!r}")
-        for name in ("standoff_ratios", "heading_offsets_deg", "turning_ratios"):
+        for name in ("standoff_ratios", "heading_offsets_deg", "turning_ratios", "approach_times"):
             values = getattr(self, name)
             if not values or not all(math.isfinite(v) for v in values):
                 raise InputError(f"{name}: expected one number or more, got {values!r}")

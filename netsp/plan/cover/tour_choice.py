@@ -16,9 +16,11 @@ import numpy as np
 from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.base.clock import Clock
 from netsp.base.errors import LimitReachedError
+from netsp.plan.cover.arrival_turns import expected_turns
 from netsp.plan.cover.choose import choose, counting_bound, merge_patches
-from netsp.plan.cover.covering_tour import TourProblem, cheapest_tour
-from netsp.plan.cover.tour_improvement import nearest_neighbour_tour, shorten, tour_length
+from netsp.plan.cover.covering_tour import TourProblem, cheapest_tour, shortest_order
+from netsp.plan.cover.leg_classes import TetherClasses
+from netsp.plan.cover.tour_improvement import tour_length
 from netsp.plan.cover.viewpoint_distances import estimate_distances
 from netsp.plan.cover.viewpoints import Viewer, Viewpoints
 from netsp.world.simulator.coverage import Patches
@@ -76,6 +78,8 @@ class TourChooser:
         Called with a line of text now and then.
     fine : Patches
         Patches of the surface that a flight counts.
+    classes : TetherClasses, optional
+        Classes of tethers; by default legs ignore the tether.
     """
 
     viewer: Viewer
@@ -86,9 +90,18 @@ class TourChooser:
     seed: int
     on_progress: Callable[[str], None]
     fine: Patches
+    classes: TetherClasses | None = None
 
-    def choose(self, found: Viewpoints, objective: Objective) -> TourChoice:
-        """Return viewpoints that see the share, in the order of a short tour."""
+    def choose(
+        self, found: Viewpoints, objective: Objective, begun: Ints | None = None
+    ) -> TourChoice:
+        """Return viewpoints that see the share, in the order of a short tour.
+
+        Parameters
+        ----------
+        begun : ndarray of int, optional
+            Numbers of viewpoints with which the search for a tour of least time begins.
+        """
         if objective == VIEWPOINTS:
             return self._choose_fewest(found)
         policy, areas = self.viewer.policy, self.viewer.patches.areas
@@ -104,15 +117,19 @@ class TourChooser:
             distances,
             np.r_[0.0, self.speed * self.visit_times(found)],
         )
-        rng, tour = np.random.default_rng(self.seed), None
+        rng = np.random.default_rng(self.seed)
+        tour = None if begun is None else np.r_[0, 1 + begun]
+        tours = policy.tours
         for _ in range(policy.max_recounts):
-            tour = cheapest_tour(problem, rng, self.clock, policy.tours, self.on_progress, tour)
+            tour = cheapest_tour(problem, rng, self.clock, tours, self.on_progress, tour)
             missing = self.share * visible_share - self.fine_share(found.subset(tour[1:] - 1))
             if missing <= 0.0 or problem.needed >= area:
                 break
             self.on_progress(f"{100 * missing:.1f} % of the surface is missing on fine patches")
             needed = min(problem.needed + missing * float(areas.sum()), area)
             problem = replace(problem, needed=needed)
+            rounds = min(policy.recount_rounds, tours.max_rounds)
+            tours = replace(tours, max_rounds=rounds, rounds_per_visit=1)
         assert tour is not None
         return TourChoice(
             tour[1:] - 1,
@@ -124,9 +141,9 @@ class TourChooser:
     def seen_in_flight(self, found: Viewpoints) -> Bools:
         """Return the patches (n, m) that a flight sees from each viewpoint: those in view both at
         its heading and at that where the turn to it ends."""
-        _, early = self._turns(found)
+        early = self._early_headings(found)
         sees = found.sees.copy()
-        for k in np.flatnonzero(early != found.headings):
+        for k in np.flatnonzero(~np.isnan(early) & (early != found.headings)):
             sees[k] &= self.viewer.seen_from(found.places[k], float(early[k]))
         return sees
 
@@ -135,7 +152,7 @@ class TourChooser:
         flight."""
         viewer = replace(self.viewer, patches=self.fine)
         seen = np.zeros(len(self.fine.areas), dtype=bool)
-        for place, heading in zip(chosen.places, self._turns(chosen)[1], strict=True):
+        for place, heading in zip(chosen.places, self._early_headings(chosen), strict=True):
             seen |= viewer.seen_from(place, float(heading))
         return float(self.fine.areas[seen].sum() / self.fine.areas.sum())
 
@@ -146,8 +163,8 @@ class TourChooser:
         choice = choose(found.sees, self.viewer.patches.areas, self.share, self.clock, policy)
         chosen = found.subset(choice.chosen)
         distances = self._distances(chosen.places)
-        tour = nearest_neighbour_tour(distances, 1 + np.arange(len(chosen)))
-        tour = shorten(distances, tour, policy.tours)
+        places, rng = 1 + np.arange(len(chosen)), np.random.default_rng(self.seed)
+        tour = shortest_order(distances, places, rng, self.clock, policy.tours)
         length = tour_length(distances, tour)
         seconds = length / self.speed + float(self.visit_times(chosen).sum())
         return TourChoice(choice.chosen[tour[1:] - 1], choice.bound, length, seconds)
@@ -159,7 +176,7 @@ class TourChooser:
         try:
             return self.clock.bounded(
                 "estimating the legs between viewpoints",
-                lambda: estimate_distances(self.viewer, points),
+                lambda: estimate_distances(self.viewer, points, classes=self.classes),
             )
         except LimitReachedError:
             return np.asarray(np.linalg.norm(points[:, None] - points[None], axis=2))
@@ -167,20 +184,20 @@ class TourChooser:
     def visit_times(self, found: Viewpoints) -> Floats:
         """Return the estimated time (n,) of a visit at each viewpoint, s.
 
-        The robot arrives with the heading of the nearest patch, and turns from there.
+        The robot arrives with the heading of the nearest patch, and turns from there. It passes a
+        viewpoint without a heading.
         """
         policy, flight = self.viewer.policy, SimulationPolicy()
         rate = math.radians(VehiclePolicy().max_turn_rate_deg)
-        return np.asarray(self._turns(found)[0] / rate + policy.visit_steps * flight.step_s)
+        turns = expected_turns(self.viewer, found.places, found.headings, self.speed)
+        times = turns / rate + policy.visit_steps * flight.step_s
+        return np.where(np.isnan(found.headings), 0.0, times)
 
-    def _turns(self, found: Viewpoints) -> tuple[Floats, Floats]:
-        """Return the angle (n,) of the turn at each viewpoint, and the heading where it may end.
-
-        A turn ends within a tolerance of the heading.
-        """
+    def _early_headings(self, found: Viewpoints) -> Floats:
+        """Return the headings (n,) where turns to those of viewpoints may end, within a tolerance;
+        NaN without a heading."""
         tolerance = math.radians(SimulationPolicy().heading_tolerance_deg)
         arrival, is_known = self.viewer.arrival_headings(found.places)
         turns = (found.headings - arrival + math.pi) % (2.0 * math.pi) - math.pi
         turns = np.where(is_known, turns, math.radians(self.viewer.policy.free_turn_deg))
-        left = np.clip(turns, -tolerance, tolerance)
-        return np.abs(turns - left), found.headings - left
+        return np.asarray(found.headings - np.clip(turns, -tolerance, tolerance))

@@ -2,7 +2,8 @@
 
 A leg is straight where it keeps the clearance. Other legs are shortest paths in a sparse graph over
 the viewpoints and over points that stand off from the surface by the clearance, where paths round
-solids turn. The tether is ignored: lengths rank tours, and the planner drives the legs.
+solids turn. Along all legs the tether stays in the class of the shortest ones if these classes are
+given (`netsp.plan.cover.leg_classes`). Lengths rank tours, and the planner drives the legs.
 """
 
 from __future__ import annotations
@@ -13,10 +14,16 @@ import numpy as np
 
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.plan.cover.cover_policy import CoverPolicy
+from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.viewpoints import Viewer, spread_out
 
 
-def estimate_distances(viewer: Viewer, places: Floats, policy: CoverPolicy | None = None) -> Floats:
+def estimate_distances(
+    viewer: Viewer,
+    places: Floats,
+    policy: CoverPolicy | None = None,
+    classes: TetherClasses | None = None,
+) -> Floats:
     """Return the estimated lengths of legs between places, shape (n, n), metres.
 
     Parameters
@@ -25,6 +32,9 @@ def estimate_distances(viewer: Viewer, places: Floats, policy: CoverPolicy | Non
         Places, metres; they may repeat.
     policy : CoverPolicy, optional
         Effort; by default that of the viewer.
+    classes : TetherClasses, optional
+        Classes of tethers; legs keep to those of the shortest ones. By default the tether is
+        ignored.
     """
     from scipy import sparse
     from scipy.sparse.csgraph import dijkstra
@@ -36,9 +46,13 @@ def estimate_distances(viewer: Viewer, places: Floats, policy: CoverPolicy | Non
     nodes = np.vstack([distinct, _turning_points(viewer, policy)])
     a, b = neighbour_pairs(distinct, max(policy.sparse_neighbours, policy.max_sight_lines // count))
     is_straight = are_clear(viewer, distinct[a], distinct[b])
+    if classes is not None:
+        is_straight &= classes.stay(distinct[a], distinct[b])
     a, b = a[is_straight], b[is_straight]
     u, v = neighbour_pairs(nodes, policy.sparse_neighbours)
     is_leg = are_clear(viewer, nodes[u], nodes[v])
+    if classes is not None:
+        is_leg &= classes.stay(nodes[u], nodes[v])
     u, v = u[is_leg], v[is_leg]
     lengths = np.maximum(np.linalg.norm(nodes[u] - nodes[v], axis=1), 1e-9)
     graph = sparse.csr_matrix((lengths, (u, v)), shape=(len(nodes), len(nodes)))

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from netsp.base.clock import Clock
 from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
-from netsp.world.simulator.coverage import Coverage, Patches, nearest_point
+from netsp.world.simulator.coverage import Coverage, Patches
 from netsp.world.simulator.mesh_patches import merged
 
 
@@ -33,9 +35,10 @@ class Viewpoints(ComparesArrays):
     places : ndarray, shape (n, 3)
         Places, metres.
     headings : ndarray, shape (n,)
-        Radians from the x axis towards y.
+        Radians from the x axis towards y; NaN for viewpoints without a heading, to which the robot
+        does not turn.
     sees : ndarray of bool, shape (n, m)
-        Whether each viewpoint sees each patch.
+        Whether each viewpoint sees each patch; without a heading, whatever the robot's heading is.
     """
 
     places: Floats
@@ -80,8 +83,25 @@ class Viewer:
     allowed: Callable[[Floats], Bools]
     policy: CoverPolicy
 
+    @cached_property
+    def _patch_tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.patches.centres)
+
     def seen_from(self, place: Floats, heading: float) -> Bools:
-        """Return whether each patch (m,) is seen from a place with a heading."""
+        """Return whether each patch (m,) is seen from a place with a heading; with NaN, whether it
+        is seen with any heading."""
+        if not math.isnan(heading):
+            return self._seen_with(place, heading)
+        count = self.policy.free_headings
+        seen = self._seen_with(place, 0.0)
+        for k in range(1, count):
+            if seen.any():
+                seen &= self._seen_with(place, 2.0 * math.pi * k / count)
+        return seen
+
+    def _seen_with(self, place: Floats, heading: float) -> Bools:
         patches = self.patches
         look = Coverage(patches, self.field, self.camera)
         look.look(place, heading)
@@ -139,18 +159,22 @@ class Viewer:
         is_known : ndarray of bool, shape (n,)
             False where the patch is straight above or below, so that the robot keeps its heading.
         """
-        near = np.array([nearest_point(self.patches.centres, p) for p in places], dtype=np.int64)
-        toward = self.patches.centres[near] - places
+        toward = self.patches.centres[self._patch_tree.query(places)[1]] - places
         is_known = np.hypot(toward[:, 0], toward[:, 1]) >= 0.2 * np.linalg.norm(toward, axis=1)
         return np.where(is_known, np.arctan2(toward[:, 1], toward[:, 0]), 0.0), is_known
 
-    def views(self, places: Floats, headings: Floats) -> Viewpoints:
-        """Return the viewpoints at places (n, 3) with headings (n,), and what each sees."""
-        sees = [self.seen_from(p, float(h)) for p, h in zip(places, headings, strict=True)]
+    def views(self, places: Floats, headings: Floats, clock: Clock | None = None) -> Viewpoints:
+        """Return the viewpoints at places (n, 3) with headings (n,), and what each sees; when a
+        clock is up, the first ones only."""
+        sees: list[Bools] = []
+        for place, heading in zip(places, headings, strict=True):
+            if clock is not None and clock.is_up:
+                break
+            sees.append(self.seen_from(place, float(heading)))
         return Viewpoints(
-            places,
-            headings,
-            np.array(sees, dtype=bool).reshape(len(places), len(self.patches.areas)),
+            places[: len(sees)],
+            headings[: len(sees)],
+            np.array(sees, dtype=bool).reshape(len(sees), len(self.patches.areas)),
         )
 
 
@@ -218,8 +242,9 @@ def find_more_viewpoints(
     """Return viewpoints with others between them, so that a tour can choose among many.
 
     Patches that are spread evenly are looked at from several distances and at several angles, and
-    from the same places with the heading of a robot that arrives, which takes no turn. When the
-    clock is up, the viewpoints found by then are returned.
+    from the same places without a turn: with the heading of a robot that arrives, or straight above
+    or below the surface, where that heading is not known, without a heading. When the clock is up,
+    the viewpoints found by then are returned.
 
     Parameters
     ----------
@@ -243,9 +268,10 @@ def find_more_viewpoints(
         toward = patches.centres[before] - places
         is_aside = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
         straight = np.where(is_aside, np.arctan2(toward[:, 1], toward[:, 0]), arrival)
-        views += [viewer.views(places, straight + offset) for offset in offsets]
-        is_other = is_level & (np.abs(straight - arrival) > math.radians(1.0))
-        views.append(viewer.views(places[is_other], arrival[is_other]))
+        views += [viewer.views(places, straight + offset, clock) for offset in offsets]
+        is_other = ~is_level | (np.abs(straight - arrival) > math.radians(1.0))
+        turnless = np.where(is_level, arrival, np.nan)
+        views.append(viewer.views(places[is_other], turnless[is_other], clock))
     return Viewpoints(
         np.vstack([v.places for v in views]),
         np.concatenate([v.headings for v in views]),
