@@ -220,6 +220,22 @@ def test_without_a_heading_only_what_any_heading_shows_counts():
     assert not viewer.seen_from(np.array([2.0, 0.0, -4.0]), math.nan).any()
 
 
+def test_what_a_passing_robot_counts_is_seen_from_beside_too():
+    viewer, rng = viewer_of(BALL), np.random.default_rng(3)
+    chooser = TourChooser(
+        viewer, np.zeros(3), 0.4, 0.99, Clock(), 0, lambda _: None, viewer.patches
+    )
+    found = viewer.views(np.array([[0.0, 0.0, -2.0]]), np.array([np.nan]))
+    counted = chooser.seen_in_flight(found)[0]
+    assert 10 < counted.sum() < found.sees[0].sum()
+    for _ in range(20):
+        aside = rng.normal(size=3)
+        aside *= viewer.policy.passing_distance / np.linalg.norm(aside)
+        heading = float(rng.uniform(-math.pi, math.pi))
+        missed = counted & ~viewer.seen_from(found.places[0] + aside, heading)
+        assert missed.sum() <= 0.05 * counted.sum()
+
+
 def test_legs_that_stay_in_their_class_have_an_empty_word():
     torus = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2.0, "minor_radius": 0.3}
     scene, anchor = Scene(solids=[{"torus": torus}]), np.array([3.5, 0.0, 2.0])

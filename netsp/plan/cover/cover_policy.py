@@ -116,6 +116,9 @@ class CoverPolicy:
     free_headings
         Number of headings with which a patch must be seen from a viewpoint without a heading. It is
         odd, because a view straight down repeats after a quarter turn.
+    passing_distance
+        Distance at which the robot may pass a viewpoint without a heading, metres: the reach of a
+        mission, and its path between two looks of the camera.
     max_candidates
         Maximum number of viewpoints that such a tour chooses among.
     counted_ratios
@@ -175,6 +178,7 @@ class CoverPolicy:
     standoff_ratios: tuple[float, ...] = (0.7, 1.0, 1.4, 1.8)
     heading_offsets_deg: tuple[float, ...] = (0.0,)
     free_headings: int = 7
+    passing_distance: float = 0.14
     max_candidates: int = 4000
     counted_ratios: tuple[float, ...] = (0.0, 0.5)
     max_views: int = 400_000_000

@@ -23,6 +23,7 @@ from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.tour_improvement import tour_length
 from netsp.plan.cover.viewpoint_distances import estimate_distances
 from netsp.plan.cover.viewpoints import Viewer, Viewpoints
+from netsp.world.mission.equipment import Camera
 from netsp.world.simulator.coverage import Patches
 from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.vehicle.vehicle_policy import VehiclePolicy
@@ -140,12 +141,29 @@ class TourChooser:
 
     def seen_in_flight(self, found: Viewpoints) -> Bools:
         """Return the patches (n, m) that a flight sees from each viewpoint: those in view both at
-        its heading and at that where the turn to it ends."""
+        its heading and at that where the turn to it ends.
+
+        The robot only passes viewpoints without a heading, so a patch must be in view from some
+        distance away, too.
+        """
         early = self._early_headings(found)
         sees = found.sees.copy()
         for k in np.flatnonzero(~np.isnan(early) & (early != found.headings)):
             sees[k] &= self.viewer.seen_from(found.places[k], float(early[k]))
+        passing = replace(self.viewer, camera=self._camera_in_passing())
+        for k in np.flatnonzero(np.isnan(found.headings)):
+            sees[k] &= passing.seen_from(found.places[k], math.nan)
         return sees
+
+    def _camera_in_passing(self) -> Camera:
+        """Return a camera with a view so narrow that it shows nothing which the camera of a robot
+        that passes at some distance does not show."""
+        policy, camera = self.viewer.policy, self.viewer.camera
+        nearest = min(policy.standoff_ratios) * self.viewer.standoff
+        half = math.tan(math.radians(0.5 * camera.field_of_view))
+        narrow = max(half - policy.passing_distance / nearest, 0.1 * half)
+        field_of_view = math.degrees(2.0 * math.atan(narrow))
+        return camera.model_copy(update={"field_of_view": field_of_view})
 
     def fine_share(self, chosen: Viewpoints) -> float:
         """Return the share of the surface that is seen, counted on the fine patches as in a
