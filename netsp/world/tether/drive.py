@@ -22,15 +22,14 @@ def move_end(
     strand: Floats,
     count: int,
     last: bool,
-    x: float,
-    y: float,
-    z: float,
+    target: tuple[float, float, float],
     settings: PullSettings,
 ) -> tuple[Floats, int, float]:
     """Move one end as `pull_end` does, and let contacts creep by the length that passes.
 
     What a slip makes the strand shorter passes over some of its contacts only, and does not count.
     """
+    x, y, z = target
     if settings.hold_friction <= 0.0:
         return pull_end(field, strand, count, last, x, y, z, settings)
     before, end = strand_length(strand, count), count - 1 if last else 0
@@ -61,7 +60,7 @@ def follow(
     depth = -distance(field, x, y, z)
     if depth > 0.25 * settings.delta:
         return strand, 0.0, 0.0, depth
-    strand, count, residual = move_end(field, strand.copy(), len(strand), last, x, y, z, settings)
+    strand, count, residual = move_end(field, strand.copy(), len(strand), last, (x, y, z), settings)
     length = strand_length(strand, count) + corner_excess(field, strand, count, settings)
     return strand[:count].copy(), residual, length, depth
 
@@ -78,7 +77,7 @@ def drive(
     lengths, residual = np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = move_end(
-            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
+            field, strand, count, True, (path[k, 0], path[k, 1], path[k, 2]), settings
         )
         lengths[k] = strand_length(strand, count)
         if lengths[k] >= floor or k == len(path) - 1:

@@ -126,7 +126,7 @@ def drive_under(
     payouts, turnings, residual = np.empty(len(path)), np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = move_end(
-            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
+            field, strand, count, True, (path[k, 0], path[k, 1], path[k, 2]), settings
         )
         more = corner_excess(field, strand, count, settings)
         payouts[k] = strand_payout(strand, count, load) + (1.0 + load.slack) * more
