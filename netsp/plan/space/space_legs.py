@@ -261,7 +261,7 @@ class StateGrowth:
     arrives: the word of a state times the word of a path is the word at its end, and a tether that
     is not known there yet is pulled taut, which takes a tenth of the time. Whether the tether keeps
     its limit all along such a leg is known once a tour along it is driven. Legs to a place where
-    two tethers of that word hang differently are driven all the same.
+    two tethers of that word hang differently are still driven.
 
     Attributes
     ----------

@@ -218,7 +218,7 @@ class StateSearch:
     @property
     def _fast_options(self) -> dict[str, Any]:
         """Return the options of the solver while states are still added: with legs that are not
-        driven, there are so many that a proof takes longer than adding more."""
+        driven, states soon become so many that a proof would take longer than adding others."""
         options = self.run.options
         if not self.growth.by_words or options["solver"] != "auto":
             return options

@@ -225,6 +225,7 @@ def _add_states(states: States, n: int, found: WordSearch, line: Floats, max_sta
             continue
         hanging_word = context.word_number(tether.nodes)
         if hanging_word is not None and states.find(n, hanging_word, tether) is None:
-            number = states.add(n, hanging_word, tether)
+            # a search that is resumed may have filled the place with states of legs
+            number = states.add(n, hanging_word, tether, beyond_max=True)
             if number is not None:
                 states.from_start.add(number)
