@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -291,6 +292,8 @@ class StateGrowth:
     _count_by_word: int = 0
     _ambiguous: set[tuple[int, int]] = field(default_factory=set)
     _too_long: set[tuple[int, int]] = field(default_factory=set)
+    # legs that were driven, as pairs of states
+    _driven: set[tuple[int, int]] = field(default_factory=set)
     # states whose legs lead to states of all words already
     _surrounded: set[int] = field(default_factory=set)
 
@@ -376,6 +379,7 @@ class StateGrowth:
         if w is None:
             return False
         self.legs.add(v, w, path)
+        self._driven.add((v, w))
         return True
 
     def surround(self, tour: Iterable[int], max_new: int, clock: Clock) -> int:
@@ -405,6 +409,43 @@ class StateGrowth:
         # their legs to states that are not known yet are not queued
         self._known = max(self._known, len(self.states.entries))
         return len(self.states.entries) - first
+
+    def correct(self, tour: Sequence[int]) -> bool:
+        """Drive the legs of a tour that are known by their words only, and replace those that
+        arrive elsewhere; return whether there were any.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            States of the tour.
+        """
+        is_wrong = False
+        for v, w in pairwise(tour):
+            for ends in ((v, w), (w, v)):
+                if ends in self.legs.arrives and not self._does_arrive(*ends):
+                    is_wrong = True
+        return is_wrong
+
+    def _does_arrive(self, v: int, w: int) -> bool:
+        """Return whether the leg between two states arrives; if not, replace it by one to the state
+        in which it does, if the tether keeps its limit."""
+        states, path = self.states, self.legs.arrives[v, w]
+        if (v, w) in self._driven:
+            return True
+        self._driven.add((v, w))
+        end = states.entries[w]
+        tether, longest = states.context.drive(states.entries[v].tether, path)
+        if longest <= states.limit:
+            arrived = states.find(end.place, end.word, tether)
+            if arrived == w:
+                return True
+            if arrived is None:
+                arrived = states.add(end.place, end.word, tether, beyond_max=True)
+            if arrived is not None:
+                self.legs.add(v, arrived, path)
+                self._driven.add((v, arrived))
+        del self.legs.arrives[v, w]
+        return False
 
     def _add_legs_from(self, v: int, *, with_new: bool) -> None:
         """Add the legs from a state by their words; with new states, or only to known ones."""
@@ -446,9 +487,11 @@ class StateGrowth:
                 self._too_long.add(key)
             else:
                 w = states.add(target, word, tether, beyond_max=beyond_max)
-        if w is not None:
-            self.legs.add(v, w, path)
-            self.legs.add(w, v, path[::-1])
+        if w is None:
+            return
+        for a, b, along in ((v, w, path), (w, v, path[::-1])):
+            if (a, b) not in self._driven:
+                self.legs.add(a, b, along)
 
     def _may_fit(self, state: State, target: int, word: int, path: Floats) -> bool:
         """Return whether the tether may be within its limit at the end of a path. Pulling it taut

@@ -645,8 +645,8 @@ def _plan_of_search(
 
 
 def _candidates(search: StateSearch) -> Iterator[SpacePlan]:
-    """Yield the candidates along states and legs: ever shorter tours along taut legs, and those that
-    `candidate_plans` names after them."""
+    """Yield the candidates along states and legs: ever shorter tours along taut legs, and those
+    that `candidate_plans` names after them."""
     run, mission = search.run, search.run.mission
     search.connect()
     for found in search.tours_along_taut_legs():

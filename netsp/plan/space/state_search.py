@@ -8,7 +8,7 @@ first leg that did not arrive in its state is forbidden, and the graph is solved
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -231,6 +231,14 @@ class StateSearch:
         by_words = self.growth.by_words
         return self.board.update(self.growth.legs, part, only_from_start=by_words)
 
+    def correct(self, tour: Sequence[int], clock: Clock) -> bool:
+        """Drive the legs of a tour that are known by their words only, each by itself, and give
+        those that replace wrong ones to the board; return whether any was wrong."""
+        if not self.growth.by_words or not self.growth.correct(tour):
+            return False
+        self._update_board(clock)
+        return True
+
     def _surround_tours(self, clock: Clock) -> Iterator[tuple[Result, DrivenTour]]:
         """Add the states around the best tour, and solve again, until no states are new, or the
         time is up; yield each shorter tour.
@@ -261,7 +269,7 @@ class StateSearch:
         graph = len(self.states.entries), len(self.growth.legs.arrives)
         if self._is_optimal and self._solved == graph:
             return
-        found = _best_driven(self.board, clock, self.run.on_progress, self.best, share, options)
+        found = _best_driven(self, clock, share, options)
         before = self.best
         self.best, self._solved = _better(before, found), graph
         if self.best is not None and (
@@ -291,21 +299,16 @@ def _better(
 
 
 def _best_driven(
-    board: StateGraph,
-    clock: Clock,
-    on_progress: Callable[[str], None],
-    best: tuple[Result, DrivenTour] | None,
-    share: float,
-    options: dict[str, Any],
+    search: StateSearch, clock: Clock, share: float, options: dict[str, Any]
 ) -> tuple[Result, DrivenTour] | None:
     """Return the best tour that was driven without fault.
 
     As long as there is time, the graph is solved again without the legs at fault; then those legs
     are replaced by paths through the start.
     """
-    times = board.context.policy.times
+    board, on_progress, times = search.board, search.run.on_progress, search.run.times
     n_solves, found = 0, None
-    warm_start = None if best is None else best[1].tour
+    warm_start = None if search.best is None else search.best[1].tour
     while n_solves < times.max_solves or clock.is_up:
         if found is None:
             faults = f", {counted(n_solves, 'leg')} at fault forbidden" if n_solves else ""
@@ -316,6 +319,9 @@ def _best_driven(
                 return None
         result, tour = found
         on_progress("driving the tour")
+        if not clock.is_up and search.correct(tour, clock):
+            n_solves, found = n_solves + 1, None
+            continue
         driven = board.drive(tour)
         if driven.fault is None:
             return with_status(result, driven), driven
