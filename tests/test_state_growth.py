@@ -103,3 +103,28 @@ def test_each_tour_of_the_search_is_shorter_than_those_before(among_posts):
     assert lengths == sorted(lengths, reverse=True)
     assert search.best[1].length == lengths[-1]
     assert search.best[1].free
+
+
+def test_a_path_between_two_sides_of_a_plate_may_lead_over_any_of_its_rims():
+    """The waypoints are 2 m apart and the plate 4 m across: the way over the far rim is thrice as
+    long as the distance."""
+    plate = Scene(
+        solids=[{"box": {"center": [0.0, 0.0, 0.0], "size": [0.2, 4.0, 4.0]}}],
+        bounds=(-4.0, -4.0, -4.0, 4.0, 4.0, 4.0),
+    )
+    mission = Mission(
+        scene="-", anchor=(-2.0, 0.0, 3.0), start=(-2.0, 0.0, 3.0), tether_length=20.0,
+        waypoints=[(-1.0, 0.3, 0.6), (1.0, 0.3, 0.6)], clearance=0.2, cell=0.25,
+    )  # fmt: skip
+    context = PlanningContext.for_mission(mission, plate, plate.field())
+    places = Places.for_mission(mission, context.field)
+    paths = RobotPaths(context, places, StatePolicy().effort(len(places)))
+    paths.find_all(Clock(), lambda text: None)
+    rims = {
+        (axis, np.sign(path[k, axis]))
+        for _, path in paths.between(0, 1)
+        for axis in (1, 2)
+        for k in range(len(path))
+        if abs(path[k, axis]) > 2.0
+    }
+    assert rims == {(1, -1.0), (1, 1.0), (2, -1.0), (2, 1.0)}

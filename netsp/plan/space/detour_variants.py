@@ -58,7 +58,10 @@ def find_bent_paths(
 def _bent_paths(
     begin: Floats, end: Floats, max_length: float, policy: DetourPolicy
 ) -> Iterator[Floats]:
-    """Yield paths with one bend, out from the straight one."""
+    """Yield paths out from the straight one, with one bend or with two.
+
+    A plate with a waypoint close behind it is passed only by going straight out first.
+    """
     step = end - begin
     straight_length = float(np.linalg.norm(step))
     if straight_length < 1e-9 or max_length <= straight_length:
@@ -69,6 +72,7 @@ def _bent_paths(
         for angle in np.linspace(0.0, 2.0 * math.pi, policy.n_bend_directions, endpoint=False):
             offset = share * max_offset * (math.cos(angle) * u + math.sin(angle) * v)
             yield np.array([begin, begin + 0.5 * step + offset, end])
+            yield np.array([begin, begin + offset, end + offset, end])
 
 
 def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
@@ -85,12 +89,19 @@ def _is_free(context: PlanningContext, path: Floats) -> bool:
 
 
 def _is_seen_from(context: PlanningContext, known_path: Floats, bent: Floats) -> bool:
-    """Return whether one path can be pulled straight across into the other."""
-    shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)[1:-1]
+    """Return whether one path can be pulled straight across into the other.
+
+    Lines of sight join points of both paths at equal shares, and each of them to the next one of
+    the other path: a thin plate may stand between two shares.
+    """
+    shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)
     known_points, bent_points = _points_at(known_path, shares), _points_at(bent, shares)
-    return all(
-        context.field.line_of_sight(a, b) for a, b in zip(known_points, bent_points, strict=True)
+    lines = (
+        *zip(known_points[1:-1], bent_points[1:-1], strict=True),
+        *zip(known_points[:-1], bent_points[1:], strict=True),
+        *zip(bent_points[:-1], known_points[1:], strict=True),
     )
+    return all(context.field.line_of_sight(a, b) for a, b in lines)
 
 
 def _is_alike(a: Floats, b: Floats, delta: float) -> bool:

@@ -395,7 +395,8 @@ class StateEffort:
     paths
         Maximum number of classes of paths between two waypoints.
     max_path_ratio
-        Longest path between two waypoints, as a multiple of their distance.
+        Longest path between two waypoints, as a multiple of their distance; for paths on other
+        sides of bodies with free ends, of their shortest path.
     detours
         Excess lengths of detours, as shares of the leg.
     detour_directions

@@ -98,7 +98,9 @@ class RobotPaths:
             paths.sort(key=_length_of)
             if found is not None and paths:
                 known = [path for _, path in paths]
-                bent = find_bent_paths(context, known, self._max_length(n, m))
+                # a wall between two close waypoints makes all paths long
+                shortest = max(float(self._distances[n, m]), polylines.length(known[0]))
+                bent = find_bent_paths(context, known, self.effort.max_path_ratio * shortest)
                 paths += self._numbered(bent)
                 paths.sort(key=_length_of)
             if search:
@@ -411,8 +413,8 @@ class StateGrowth:
         return len(self.states.entries) - first
 
     def correct(self, tour: Sequence[int]) -> bool:
-        """Drive the legs of a tour that are known by their words only, and replace those that
-        arrive elsewhere; return whether there were any.
+        """Drive the legs of a tour that are known by words alone, and replace each wrong leg, whose
+        tether arrives in another state; return whether any was wrong.
 
         Parameters
         ----------

@@ -217,8 +217,11 @@ class StateSearch:
 
     @property
     def _fast_options(self) -> dict[str, Any]:
-        """Return the options of the solver while states are still added: with legs that are not
-        driven, states soon become so many that a proof would take longer than adding others."""
+        """Return the options of the solver while states are still added.
+
+        Where legs are not driven, states soon become so many that a proof would take longer than
+        adding others.
+        """
         options = self.run.options
         if not self.growth.by_words or options["solver"] != "auto":
             return options
@@ -232,8 +235,8 @@ class StateSearch:
         return self.board.update(self.growth.legs, part, only_from_start=by_words)
 
     def correct(self, tour: Sequence[int], clock: Clock) -> bool:
-        """Drive the legs of a tour that are known by their words only, each by itself, and give
-        those that replace wrong ones to the board; return whether any was wrong."""
+        """Drive the legs of a tour that are known by words alone, each by itself, and give the
+        corrected legs to the board; return whether any was wrong."""
         if not self.growth.by_words or not self.growth.correct(tour):
             return False
         self._update_board(clock)

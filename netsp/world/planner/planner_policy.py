@@ -74,8 +74,8 @@ class PredictivePolicy:
         Number of steps between two checks that the tether still comes free on the path home.
     min_home_room
         Share of the clearance, or of the room at its ends if that is less, that a path home keeps.
-        If it comes nearer to solids, the robot goes home the way it came, pulled taut, where that
-        keeps more room.
+        If it comes nearer to solids, the robot goes home along its own path so far, pulled taut,
+        where that keeps more room.
     max_home_attempts
         Maximum number of times that the robot goes back along a tether which is not free at home.
     pull_rounds

@@ -547,8 +547,8 @@ class PredictivePlanner(Planner):
         return path
 
     def _home_as_it_came(self, robot: Floats, tether: Tether) -> Floats | None:
-        """Return the path home the way that the robot came, pulled as far as the tether fits and
-        comes free.
+        """Return the robot's own path so far back home, pulled as far as the tether fits and comes
+        free.
 
         A tether may hang in a gap that is too narrow for the robot, and so may a path back along
         it. Where the robot has been, it had room.
