@@ -219,8 +219,7 @@ class StateSearch:
     def _fast_options(self) -> dict[str, Any]:
         """Return the options of the solver while states are still added.
 
-        Where legs are not driven, states soon become so many that a proof would take longer than
-        adding others.
+        Where legs are not driven, proofs soon take too long, because there are many states.
         """
         options = self.run.options
         if not self.growth.by_words or options["solver"] != "auto":

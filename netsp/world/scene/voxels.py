@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from netsp.base.arrays import Bools, Floats, Singles
 from netsp.base.bounded_work import end_if_abandoned
-from netsp.base.errors import InputError
+from netsp.base.errors import InputError, counted
 from netsp.world.scene.face_tree import FaceTree
 from netsp.world.scene.grid import SIDE, VoxelGrid
 from netsp.world.scene.lattice import Dense, Lattice, OnStage, report_stage, sparse_near
@@ -238,7 +238,7 @@ class _Triangles:
         if len(self.loose):
             lattice.turn_wound(values, FaceTree.build(self.loose))
         if self.turned:
-            return [f"{self.turned} parts are inside out, or cavities: taken as solid"]
+            return [f"{counted(self.turned, 'part')} inside out, or a cavity: taken as solid"]
         return ["parts of the mesh overlap: taken as their union"] if max_winding > 1 else []
 
     def _thin(self, lattice: Lattice, values: Singles) -> Bools:
