@@ -116,7 +116,7 @@ rods = st.builds(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.lists(st.one_of(boxes, bars, rods), min_size=1, max_size=3), st.floats(0.0, 0.3),
        st.integers(0, 1000))  # fmt: skip
 def test_no_bound_is_above_a_path_that_keeps_the_room(solids, room, seed):
@@ -144,7 +144,7 @@ def test_no_bound_is_above_a_path_that_keeps_the_room(solids, room, seed):
             return
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(places, min_size=4, max_size=4), st.floats(-0.99, 0.99), st.floats(-0.99, 0.99),
        st.floats(0, 1), st.floats(0, 1))  # fmt: skip
 def test_a_link_costs_no_more_than_any_way_between_its_pieces(ends, slope, other, s, t):
@@ -159,7 +159,7 @@ def test_a_link_costs_no_more_than_any_way_between_its_pieces(ends, slope, other
     assert link_cost(pieces, 0, 1) <= max(0.0, np.linalg.norm(q - p) + of_ends) + 1e-9
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(boxes, st.lists(places, min_size=4, max_size=4), st.integers(0, 1000))
 def test_what_is_blocked_is_blocked_for_all_points(box, ends, seed):
     field = Scene(solids=[box]).field()

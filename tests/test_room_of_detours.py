@@ -41,12 +41,13 @@ def room_of_flight(max_cut):
 
 
 def test_a_robot_goes_back_between_bars_without_cutting_into_them():
-    room, summary = room_of_flight(PreviewPolicy().max_cut)
-    assert room > -0.0015  # half as much again as a path may cut, `TetherPreview.meets_solid`
-    assert summary["visited"] == len(ABOUT.waypoints)
-    assert summary["home"]["tether_free"]
-    deeper, _ = room_of_flight(0.2)
-    assert deeper < -0.01
+    """Also with a tolerance by which a path between the bars would do: it goes home along its own
+    path."""
+    for max_cut in (PreviewPolicy().max_cut, 0.2):
+        room, summary = room_of_flight(max_cut)
+        assert room > 0.1
+        assert summary["visited"] == len(ABOUT.waypoints)
+        assert summary["home"]["tether_free"]
 
 
 corner = st.tuples(*[st.floats(-1.5, 1.5)] * 3)

@@ -4,6 +4,7 @@ import dataclasses
 import heapq
 import itertools
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from netsp.command.main import main
 from netsp.hsignature.wordtable import times, times_inverse
 from netsp.plan.space.board import StateGraph
 from netsp.plan.space.judge import verify_mission
-from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
+from netsp.plan.space.mission_policy import PotentialPolicy, StageTimePolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
@@ -363,7 +364,9 @@ def test_a_tour_whose_only_way_is_forbidden_when_the_time_is_up_is_not_driven_ag
     line = places.points[[0, 1]]
     board.update(DrivenLegs({(a, b): line, (b, a): line[::-1]}), Clock())
     assert board.can_reach_all([a, b])
-    assert _best_driven(board, Clock(0.0), lambda _: None, None, 1.0, {"seed": 0}) is None
+    run = SimpleNamespace(on_progress=lambda _: None, times=StageTimePolicy())
+    search = SimpleNamespace(board=board, run=run, best=None)
+    assert _best_driven(search, Clock(0.0), 1.0, {"seed": 0}) is None
     assert board.can_reach_all([a])
     assert not board.can_reach_all([a, b])
 

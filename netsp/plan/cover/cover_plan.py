@@ -404,10 +404,7 @@ def _build_cover(
     objective: Objective,
 ) -> Cover:
     chosen, policy = found.subset(choice.order), reach.policy
-    length = mission.tether_length
-    if length == UNKNOWN_TETHER_LENGTH:
-        longest = float(reach.tethers(chosen.places).max())
-        length = round(policy.tether_ratio * longest + policy.tether_spare, 2)
+    length = _tether_length(mission, chosen, reach)
     needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
     alternatives_of = find_alternatives(found, choice.order, patches.areas, needed, policy)
     viewpoints = [_viewpoint(found, k) for k in choice.order]
@@ -435,6 +432,14 @@ def _build_cover(
         choice.length,
         choice.seconds,
     )
+
+
+def _tether_length(mission: Mission, chosen: Viewpoints, reach: _Reach) -> float:
+    """Return the length of the mission's tether, metres, with a spare if it is not stated."""
+    if mission.tether_length != UNKNOWN_TETHER_LENGTH:
+        return mission.tether_length
+    longest, policy = float(reach.tethers(chosen.places).max()), reach.policy
+    return round(policy.tether_ratio * longest + policy.tether_spare, 2)
 
 
 def _viewpoint(found: Viewpoints, k: int) -> Viewpoint:
