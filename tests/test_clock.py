@@ -1,5 +1,7 @@
 """One clock for a whole run: compiled loops hear it, and nothing goes on for long after it."""
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -266,6 +268,28 @@ def test_work_within_abandoned_work_is_abandoned_too():
         Clock(0.02).bounded("counting on", lambda: inner.bounded("counting", _never_ends))
     assert not is_abandoned_work_running(wait=20.0)
     assert not [t for t in threading.enumerate() if t.name == BOUNDED]
+
+
+LEAVES_WORK = """
+import sys, time
+from netsp.base.bounded_work import AbandonableCall
+
+def work():
+    time.sleep(float(sys.argv[1]))  # as C++ code that returns to Python when it is done
+    print("ended")
+
+AbandonableCall(work).abandon(exit_grace_s=float(sys.argv[2]))
+"""
+
+
+@pytest.mark.parametrize(("work_s", "grace_s", "said"), [(0.3, 60.0, "ended\n"), (60.0, 0.1, "")])
+def test_python_waits_at_exit_for_abandoned_work_but_no_longer_than_allowed(work_s, grace_s, said):
+    """Python ends threads that return from C++ code after its exit, which aborts the process."""
+    done = subprocess.run(
+        [sys.executable, "-c", LEAVES_WORK, str(work_s), str(grace_s)],
+        capture_output=True, text=True, timeout=50.0,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (0, said, "")
 
 
 def test_work_that_ends_within_the_grace_is_not_abandoned():

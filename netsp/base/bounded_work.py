@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextvars
 import threading
 import time
@@ -60,10 +61,19 @@ class AbandonableCall(ThreadedCall[T]):
         context.run(_abandoned.set, self._flag)
         super().__init__(lambda: context.run(call), BOUNDED)
 
-    def abandon(self) -> None:
-        """Leave the call to end by itself, at the next `end_if_abandoned` or with the process."""
+    def abandon(self, exit_grace_s: float = 0.0) -> None:
+        """Leave the call to end by itself, at the next `end_if_abandoned` or with the process.
+
+        Parameters
+        ----------
+        exit_grace_s : float
+            Maximum time for which Python waits for the call when the process exits, s.
+        """
         self._flag[0] = 1
         _ABANDONED.append(self._thread)
+        # the limit of the last call is the one that counts
+        atexit.unregister(is_abandoned_work_running)
+        atexit.register(is_abandoned_work_running, exit_grace_s)
 
 
 def is_abandoned_work_running(wait: float = 0.0) -> bool:

@@ -45,12 +45,16 @@ class TimingPolicy:
         as by Ctrl-C. With less, more of what was found is lost; with more, the user waits longer.
     stop_interval_s : float
         Seconds between two calls of `should_stop`. A shorter interval takes more CPU.
+    exit_grace_s : float
+        Seconds for which Python waits at exit for work that was abandoned. Python ends the threads
+        of work that goes on for longer, which aborts the process in the middle of some C++ code.
     """
 
     untimed_steps: int = 100_000_000
     grace_s: float = 0.5
     stop_grace_s: float = 5.0
     stop_interval_s: float = 0.02
+    exit_grace_s: float = 10.0
 
     def __post_init__(self) -> None:
         check_not_negative(self)
@@ -347,7 +351,7 @@ class Clock:
                 if self._overdue(more) or abandoned()[0]:
                     raise self._broken_off(self._family.doing or doing)
         except (KeyboardInterrupt, LimitReachedError):
-            work.abandon()
+            work.abandon(self.policy.exit_grace_s)
             raise
         return work.result()
 
