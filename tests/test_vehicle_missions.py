@@ -33,7 +33,7 @@ def test_all_are_visited_between_plates_at_any_speed_in_any_current(speed, curre
 
 
 def test_the_way_home_is_not_through_a_gap_that_only_the_tether_fits_through():
-    """Where leaning poles cross, the tether lay in a gap of 0.05 m to either side, and the path
+    """Where leaning poles cross, the tether lay in a gap, 0.05 m from each pole, and the path
     back along it led the vehicle into a pole; the way that it came has room."""
     mission, scene = currents.mission_of("poles 1")
     mission = mission.model_copy(update={"speed": 0.8})

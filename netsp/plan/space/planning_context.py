@@ -135,12 +135,7 @@ class PlanningContext:
         bounds: tuple[float, ...] | None = None,
         policy: MissionPolicy | None = None,
     ) -> PlanningContext:
-        """Return the context of a mission on a grid that is known.
-
-        Parameters
-        ----------
-        bounds : tuple of float, optional
-            Bounds of the scene if they are known, metres.
+        """Return the context of `without_words`, with the words of paths found at once.
 
         Raises
         ------
@@ -160,7 +155,7 @@ class PlanningContext:
         bounds: tuple[float, ...] | None = None,
         policy: MissionPolicy | None = None,
     ) -> PlanningContext:
-        """Return the context of a mission whose words are found when they are first needed.
+        """Return the context of a mission on a known grid; words are found when first needed.
 
         Parameters
         ----------

@@ -213,27 +213,8 @@ class HoldingTether(GeodesicTether):
     def drive_under(
         self, tether: Tether, path: npt.ArrayLike, load: Load
     ) -> tuple[Tether, Floats, Floats]:
-        """Return the tether after the robot has followed a path, with payout and turning under a
-        load.
-
-        Parameters
-        ----------
-        tether : Tether
-            Tether before the motion; it is not changed.
-        path : array_like, shape (k, 3)
-            Points that the robot passes, metres.
-        load : Load
-            Forces on the tether.
-
-        Returns
-        -------
-        tether : Tether
-            Tether at the last point.
-        payouts : ndarray, shape (k,)
-            Largest payout at each point, metres.
-        turnings : ndarray, shape (k,)
-            Largest sum of turning angles at each point, radians.
-        """
+        """Return the tether, payouts and turnings of `GeodesicTether.drive_under`, the last two as
+        the largest of all tethers at each point."""
         taut, payouts, turnings = super().drive_under(tether, path, load)
         if len(payouts) == 0:
             return tether, payouts, turnings
