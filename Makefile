@@ -27,8 +27,9 @@ $(VENV)/.warm: $(VENV)/.installed $(KERNELS)
 	$(BIN)/netsp warm-up --quiet --jobs 2
 	touch $@
 
-# write bytecode for later commands, even where the shell sets PYTHONDONTWRITEBYTECODE
-demo: export PYTHONDONTWRITEBYTECODE =
+# write bytecode for later processes, even where the shell sets PYTHONDONTWRITEBYTECODE: without it
+# every command that a test starts compiles all its modules again
+demo test: export PYTHONDONTWRITEBYTECODE =
 demo: $(VENV)/.core
 	mkdir -p $(DEMO)
 	$(BIN)/netsp solve problems/wharf.json -o $(DEMO)/wharf-solution.json --plot $(DEMO)/wharf.png
