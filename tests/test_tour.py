@@ -93,7 +93,7 @@ def test_a_solved_mission_is_never_worse_than_the_order_given(solved):
 def test_the_bound_is_no_longer_than_any_order_without_a_tether(solved):
     mission, found = solved
     bound = bound_all_tours(found.plan.paths, [0, 1, 2, 3], Clock(), potential=FEW_CELLS.potential)
-    loose = plan(mission.model_copy(update={"tether_length": 60.0}), time_limit=None)
+    loose = plan(mission.model_copy(update={"tether_length": 60.0}), time_limit=8.0)
     assert bound <= loose.length + 1e-6
     assert bound >= 2.0 * max(np.linalg.norm(np.subtract(p, mission.start)) for p in WAYPOINTS)
 
@@ -495,21 +495,30 @@ def longest_by_steps(mission, step):
 
 @pytest.fixture(scope="module")
 def over_the_box(tmp_path_factory):
-    return solve_mission(beside_a_box(tmp_path_factory.mktemp("box"), 9.0), time_limit=20.0).mission
+    return solve_mission(beside_a_box(tmp_path_factory.mktemp("box"), 9.0), time_limit=8.0).mission
 
 
-def test_a_tether_is_as_long_as_stated_between_the_ends_of_legs_too(over_the_box):
+@pytest.fixture(scope="module")
+def longest_over_the_box(over_the_box):
+    return longest_by_steps(over_the_box, 0.02)
+
+
+def test_a_tether_is_as_long_as_stated_between_the_ends_of_legs_too(
+    over_the_box, longest_over_the_box
+):
     """Lengths were asked for at corners alone: 0.4 m too little on a straight leg."""
     tour = over_the_box.tour
     at_ends = max(stop.tether_length for stop in tour.stops)
-    longest = longest_by_steps(over_the_box, 0.02)
+    longest = longest_over_the_box
     assert longest > at_ends + 0.2
     assert tour.longest_tether == pytest.approx(longest, abs=over_the_box.delta)
 
 
-def test_where_it_would_be_too_long_on_the_way_another_tour_is_taken(over_the_box, tmp_path):
-    longest = longest_by_steps(over_the_box, 0.02)
-    shorter = solve_mission(beside_a_box(tmp_path, longest - 0.2), time_limit=20.0).mission
+def test_where_it_would_be_too_long_on_the_way_another_tour_is_taken(
+    over_the_box, longest_over_the_box, tmp_path
+):
+    limit = longest_over_the_box - 0.2
+    shorter = solve_mission(beside_a_box(tmp_path, limit), time_limit=8.0).mission
     assert verify_mission(shorter)
     assert longest_by_steps(shorter, 0.02) <= shorter.tether_length
     assert shorter.tour.length > over_the_box.tour.length + 0.05

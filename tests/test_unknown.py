@@ -79,7 +79,7 @@ def test_a_ray_measures_the_distance_to_a_ball():
     assert math.isinf(cast_rays(field.arrays, np.zeros(3), rays, 2.5)[0])
 
 
-@pytest.mark.parametrize("sensor", [None, {}, {"noise": 0.05, "range": 4}, {"field_of_view": 60}])
+@pytest.mark.parametrize("sensor", [None, {}, {"noise": 0.05, "range": 4, "field_of_view": 60}])
 def test_solids_that_are_not_on_the_map_are_neither_met_nor_wound_about(sensor):
     run = fly(IN_THE_WAY, sensor)
     assert kept(run)
