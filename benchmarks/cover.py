@@ -2,8 +2,8 @@
 viewpoints and then their tour, of fewer and of the same candidates; and the tour of others about
 the same cloud.
 
-    python benchmarks/cover.py [--structures ring hull …] [--limit S] [--resume FILE]
-                               [--external FOLDER] [--keep] [--cpu-limits]
+    python benchmarks/cover.py [--structures ring hull …] [--ways together …] [--limit S]
+                               [--resume FILE] [--external FOLDER] [--keep] [--cpu-limits]
 
 All ways have the same scene, camera, tether and limits of time, and the same search for the order
 of their waypoints. Waypoints are flown in the order that `netsp cover` writes, by the planner that
@@ -35,13 +35,17 @@ from netsp.world.simulator.mission_run import simulate
 
 CAMERA: dict[str, Any] = {"camera": Camera(range=2.5, patch=0.25), "standoff": 1.2}
 JACKET: dict[str, Any] = {"camera": Camera(range=4.0, patch=0.3), "standoff": 2.0}
-STRUCTURES = ("ring", "linked rings", "hull", "tunnel", "jacket", "external")
+STRUCTURES = ("ring", "linked rings", "hull", "tunnel", "comb", "jacket", "external")
 DENSE = CoverPolicy(dense_objectives=("time", "viewpoints"))
 EXTERNAL = ROOT.parent / "shared" / "data" / "fc_planner_pipe"
 WAYS = {
     "fewest, then tour": {"objective": "viewpoints"},
     "fewest of all candidates, then tour": {"objective": "viewpoints", "policy": DENSE},
     "together": {"objective": "time", "policy": DENSE},
+}
+FASTER = {
+    "less than the first %": "fewest, then tour",
+    "less than the second %": "fewest of all candidates, then tour",
 }
 COLUMNS = (
     "structure", "chosen", "candidates", "visible %", "waypoints", "of the visible %",
@@ -96,45 +100,49 @@ def placed(mission: Mission, scene: Scene, **how: Any) -> tuple[Cover, dict[str,
 class Rows:
     """Rows of the table, with those of a run before, and changes of the missions to fly."""
 
-    def __init__(self, resumed: Path | None) -> None:
+    def __init__(self, resumed: Path | None, ways: list[str]) -> None:
         self.changes: dict[str, Any] = {}
-        self.resumed = resumed
+        self.resumed, self.ways = resumed, ways
         is_there = resumed is not None and resumed.exists()
         self.kept: dict[str, dict[str, Any]] = json.loads(resumed.read_text()) if is_there else {}
 
     def measure(self, structure: str, chosen: str, measure: Any) -> dict[str, Any]:
-        """Return the cells of a row, measured unless a run before has measured it; print them."""
+        """Return the cells of a row, measured unless a run before has measured it."""
         name = f"{structure}: {chosen}"
         if name not in self.kept:
             self.kept[name] = {"structure": structure, "chosen": chosen, **measure()}
             if self.resumed is not None:
                 self.resumed.write_text(json.dumps(self.kept))
-        cells = self.kept[name]
+        return self.kept[name]
+
+    def show(self, cells: dict[str, Any]) -> None:
+        """Print the cells of a row."""
         row(*(cells.get(column, "") for column in COLUMNS))
-        return cells
 
 
 def compared(
     name: str, mission: Mission, scene: Scene, limit_s: float, rows: Rows, **how: Any
 ) -> dict[str, Any]:
-    """Cover a structure in all ways, and return the last cells."""
-    before: list[dict[str, Any]] = []
-    for chosen, way in WAYS.items():
-        if before:
-            how["tether_length"] = before[0]["tether"]
+    """Cover a structure in the ways that are asked for, and return the last cells."""
+    before: dict[str, dict[str, Any]] = {}
+    cells: dict[str, Any] = {}
+    for chosen in (chosen for chosen in WAYS if chosen in rows.ways):
 
-        def measure(way: dict[str, Any] = way) -> dict[str, Any]:
+        def measure(way: dict[str, Any] = WAYS[chosen]) -> dict[str, Any]:
             found, cells = placed(mission, scene, **way, **how)
             there = found.mission.model_copy(update=rows.changes)
             cells |= flown(there, scene, found.visible, limit_s)
-            names = ("less than the first %", "less than the second %")
-            for column, other in zip(names, before, strict=False):
-                ratio = float(cells["home after s"]) / float(other["home after s"])
-                cells[column] = f"{100 * (1 - ratio):.0f}"
             return {**cells, "tether": found.mission.tether_length, "visible": found.visible}
 
-        before.append(rows.measure(name, chosen, measure))
-    return before[-1]
+        cells = dict(rows.measure(name, chosen, measure))
+        for column, other in FASTER.items():
+            if other in before:
+                ratio = float(cells["home after s"]) / float(before[other]["home after s"])
+                cells[column] = f"{100 * (1 - ratio):.0f}"
+        rows.show(cells)
+        before[chosen] = cells
+        how["tether_length"] = cells["tether"]
+    return cells
 
 
 def external_pipe(mission: Mission, scene: Scene, limit_s: float, rows: Rows) -> None:
@@ -155,20 +163,21 @@ def external_pipe(mission: Mission, scene: Scene, limit_s: float, rows: Rows) ->
         cells = flown(mission, scene, ours["visible"], limit_s)
         return {"waypoints": str(len(mission.waypoints)), **cells}
 
-    rows.measure("external pipe", "FC-Planner's waypoints", theirs)
+    rows.show(rows.measure("external pipe", "FC-Planner's waypoints", theirs))
 
 
 def main() -> None:
     """Run what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--structures", nargs="*", default=STRUCTURES)
+    parser.add_argument("--ways", nargs="*", default=list(WAYS), choices=list(WAYS))
     parser.add_argument("--limit", type=float, default=0.0, help="solve each for these seconds")
     parser.add_argument("--resume", type=Path, help="file of the rows that are measured")
     parser.add_argument("--external", type=Path, default=EXTERNAL, help="folder of FC-Planner's")
     args = parser.parse_args()
     heading("Waypoints that see a structure")
     head(*COLUMNS, name="cover")
-    rows = Rows(args.resume)
+    rows = Rows(args.resume, args.ways)
     for name in args.structures:
         if name == "jacket":
             mission, scene = shipped(name)

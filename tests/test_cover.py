@@ -161,6 +161,29 @@ def test_no_choice_is_smaller_than_the_bound_and_the_best_is_found(rows, areas, 
         assert best <= len(prune(matrix, weights, first, share * total)) <= len(first)
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_each_greedy_choice_shows_most_and_each_drop_loses_least(seed):
+    rng = np.random.default_rng(seed)
+    sees, areas = rng.random((20, 40)) < 0.2, rng.uniform(0.5, 2.0, 40)
+    needed = rng.uniform(0.0, 1.0) * areas[sees.any(axis=0)].sum()
+    chosen = choose_greedily(sees, areas, needed)
+    unseen, seen_area = np.ones(40, dtype=bool), 0.0
+    for k in chosen:
+        gains = (sees & unseen) @ areas
+        assert gains[k] == pytest.approx(gains.max())
+        assert seen_area < needed
+        seen_area += gains[k]
+        unseen &= ~sees[k]
+    assert seen_area >= needed - 1e-9
+    left = list(chosen)
+    while left:
+        rests = [areas[sees[[k for k in left if k != gone]].any(axis=0)].sum() for gone in left]
+        if max(rests) < needed - 1e-9:
+            break
+        left.pop(int(np.argmax(rests)))
+    assert sorted(prune(sees, areas, chosen, needed)) == sorted(left)
+
+
 @given(st.lists(st.tuples(*[st.floats(-5, 5)] * 3), min_size=1, max_size=30), st.floats(0.1, 4.0))
 def test_points_spread_apart_are_near_to_all(points, apart):
     points = np.array(points)

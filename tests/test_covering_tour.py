@@ -14,8 +14,9 @@ from netsp.base.compiled.interpretation import interpreted
 from netsp.base.errors import InputError
 from netsp.plan.cover import cover
 from netsp.plan.cover.arrival_turns import expected_turns
+from netsp.plan.cover.choose import choose_greedily, prune
 from netsp.plan.cover.cover_policy import CoverPolicy, TourSearchPolicy
-from netsp.plan.cover.covering_rounds import RoundSettings, search_rounds
+from netsp.plan.cover.covering_rounds import RoundSettings, insertion_tour, search_rounds
 from netsp.plan.cover.covering_tour import TourProblem, cheapest_tour, shortest_order
 from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.tour_choice import TourChooser
@@ -118,10 +119,44 @@ def test_more_rounds_cover_as_much_for_no_more(seed, count):
     assert costs[1] <= costs[0] + 1e-9
 
 
-def test_a_stopped_clock_gives_the_greedy_tour():
-    problem, clock = problem_of(3, 30, 60), Clock(0.0)
-    tour = cheapest_tour(problem, np.random.default_rng(0), clock)
+@pytest.mark.parametrize("seed", range(8))
+def test_no_tour_costs_more_than_that_of_the_greedy_cover_even_without_time(seed):
+    problem = problem_of(seed, 30, 60)
+    chosen = choose_greedily(problem.sees, problem.areas, problem.needed)
+    chosen = prune(problem.sees, problem.areas, chosen, problem.needed)
+    cover_first = shorten(problem.distances, nearest_neighbour_tour(problem.distances, chosen))
+    for limit in (0.0, None):
+        policy = TourSearchPolicy(max_rounds=20)
+        tour = cheapest_tour(problem, np.random.default_rng(seed), Clock(limit), policy)
+        assert problem.seen_area(tour) >= problem.needed * (1 - 1e-9)
+        assert problem.cost(tour) <= problem.cost(cover_first) + 1e-9
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_insertions_from_the_start_alone_see_enough_unless_nothing_does(seed):
+    problem, policy = problem_of(seed, 30, 60), TourSearchPolicy()
+    settings_ = RoundSettings(*(getattr(policy, name) for name in RoundSettings._fields))
+    state = np.array([seed + 1], dtype=np.uint64)
+    tour = insertion_tour(problem.arrays(), settings_, state)
+    assert tour[0] == 0
+    assert len(set(tour.tolist())) == len(tour)
     assert problem.seen_area(tour) >= problem.needed * (1 - 1e-9)
+    assert not len(insertion_tour(problem.arrays()._replace(needed=1e9), settings_, state))
+
+
+def test_local_rounds_add_nothing_that_sees_only_what_was_unseen_before():
+    # Place 1 sees the needed area; place 2 is on the way, and sees only a patch that is not needed.
+    sees = np.array([[0, 0], [1, 0], [0, 1]], dtype=bool)
+    distances = distances_of([(0.0, 0.0), (2.0, 0.0), (1.0, 0.0)])
+    problem = TourProblem(sees, np.array([2.0, 2.0]), 2.0, distances, np.zeros(3))
+    visited = {}
+    for share in (1.0, 1e-12):
+        policy = TourSearchPolicy(local_share=share)
+        settings_ = RoundSettings(*(getattr(policy, name) for name in RoundSettings._fields))
+        tour, state = np.array([0, 1]), np.array([5], dtype=np.uint64)
+        visited[share] = search_rounds(problem.arrays(), settings_, tour, tour, (0, 50), state)[1]
+    assert visited[1.0].tolist() == [0, 1]
+    assert visited[1e-12].tolist() == [0, 2]
 
 
 def test_legs_go_round_a_wall():
@@ -304,11 +339,10 @@ def test_together_is_faster_than_the_fewest_and_sees_the_share():
     assert straight <= together.tour_length + 1e-3 * len(places)
     again = cover(BALL, time_limit=None, **how)
     assert again.mission == together.mission
-    policy = replace(FEW_ROUNDS, min_begun=1, max_views=1)
-    begun = cover(BALL, time_limit=None, on_progress=told.append, **{**how, "policy": policy})
-    assert any("fewest of" in line for line in told)
-    assert begun.seen >= 0.99 * begun.visible - 1e-9
-    assert begun.tour_s <= 0.9 * fewest.tour_s
+    policy = replace(FEW_ROUNDS, max_views=1)
+    coarse = cover(BALL, time_limit=None, **{**how, "policy": policy})
+    assert coarse.seen >= 0.99 * coarse.visible - 1e-9
+    assert coarse.tour_s <= 0.9 * fewest.tour_s
 
 
 @pytest.mark.parametrize(

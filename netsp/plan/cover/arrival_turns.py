@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from netsp.base.arrays import Bools, Floats
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.plan.cover.viewpoints import Viewer
 from netsp.world.simulator.simulation_policy import SimulationPolicy
 from netsp.world.vehicle.vehicle_policy import VehiclePolicy
@@ -41,27 +41,37 @@ def expected_turns(viewer: Viewer, places: Floats, headings: Floats, speed: floa
     rate = math.radians(VehiclePolicy().max_turn_rate_deg)
     axes = [np.array(d, dtype=float) for d in itertools.product((-1, 0, 1), repeat=3)]
     directions = [d / np.linalg.norm(d) for d in axes if d.any()]
-    at_place = np.maximum(_turns(viewer, places, headings) - tolerance, 0.0)
+    distinct, which = np.unique(places, axis=0, return_inverse=True)
+    which = which.ravel()
+    at_place = np.maximum(_turns(viewer, distinct, which, headings) - tolerance, 0.0)
     total, count = np.zeros(len(places)), np.zeros(len(places))
     for direction in directions:
-        left, is_free = at_place, np.ones(len(places), dtype=bool)
+        left, is_free = at_place, np.ones(len(distinct), dtype=bool)
         is_used = is_free
         for number, seconds in enumerate(sorted(policy.approach_times)):
-            before = places - speed * seconds * direction
+            before = distinct - speed * seconds * direction
             is_free = is_free & (viewer.field.distance(before) >= viewer.clearance)
-            turns = _turns(viewer, before, headings) - rate * seconds - tolerance
-            left = np.where(is_free, np.maximum(left, turns), left)
+            turns = _turns(viewer, before, which, headings) - rate * seconds - tolerance
+            left = np.where(is_free[which], np.maximum(left, turns), left)
             if number == 0:
                 is_used = is_free
-        total += np.where(is_used, left, 0.0)
-        count += is_used
+        total += np.where(is_used[which], left, 0.0)
+        count += is_used[which]
     turns = np.where(count > 0, total / np.maximum(count, 1.0), at_place)
     return np.where(np.isnan(headings), 0.0, turns)
 
 
-def _turns(viewer: Viewer, places: Floats, headings: Floats) -> Floats:
-    """Return the angles (n,) between the heading of a robot on its way and given headings."""
+def _turns(viewer: Viewer, places: Floats, which: Ints, headings: Floats) -> Floats:
+    """Return the angles (n,) between the heading of a robot on its way and given headings.
+
+    Parameters
+    ----------
+    places : ndarray, shape (k, 3)
+        Distinct places on the way, metres.
+    which : ndarray of int, shape (n,)
+        Number of the place of each heading.
+    """
     known: Bools
     arrival, known = viewer.arrival_headings(places)
-    turns = np.abs((headings - arrival + math.pi) % (2.0 * math.pi) - math.pi)
-    return np.where(known, turns, math.radians(viewer.policy.free_turn_deg))
+    turns = np.abs((headings - arrival[which] + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.where(known[which], turns, math.radians(viewer.policy.free_turn_deg))

@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.base.arrays import Bools, ComparesArrays, Floats, Ints
+from netsp.base.arrays import Bools, ComparesArrays, Floats
 from netsp.base.clock import Clock, TimeLimit
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.field_types import Point3, checked_argument
 from netsp.base.geometry import polylines
 from netsp.base.interrupt_signals import until_interrupt
-from netsp.plan.cover.choose import choose, choose_greedily, merge_patches
 from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.leg_classes import TetherClasses
 from netsp.plan.cover.tour_choice import TIME, VIEWPOINTS, Objective, TourChoice, TourChooser
@@ -225,9 +224,6 @@ def cover(
                 "inspect: no part of the surface can be seen from where the robot can go; "
                 "expected a shorter stand-off or clearance, or a longer tether"
             )
-        begun = None
-        if objective == TIME:
-            begun = _begun(found, patches, share, clock, policy, report)
         if objective in policy.dense_objectives:
             more_clock = clock.part(policy.more_time_share)
             viewer, found = _counted_finely(viewer, found, fine, more_clock, report)
@@ -237,27 +233,9 @@ def cover(
         chooser = TourChooser(
             viewer, start_place, mission.speed, share, clock, seed, report, fine, classes
         )
-        choice = chooser.choose(found, objective, begun)
+        choice = chooser.choose(found, objective)
         counted = share_seen(replace(viewer, patches=fine), found.subset(choice.order))
         return _build_cover(mission, patches, found, choice, counted, reach, share, objective)
-
-
-def _begun(
-    found: Viewpoints,
-    patches: Patches,
-    share: float,
-    clock: Clock,
-    policy: CoverPolicy,
-    on_progress: Callable[[str], None],
-) -> Ints | None:
-    """Return the fewest viewpoints, with which the search for a tour begins if they are many; None
-    if they are not."""
-    matrix, weights = merge_patches(found.sees, patches.areas)
-    greedy = choose_greedily(matrix, weights, share * float(weights.sum()))
-    if len(greedy) < policy.min_begun:
-        return None
-    on_progress(f"fewest of {len(found)} viewpoints")
-    return choose(found.sees, patches.areas, share, clock.part(policy.begun_time_share)).chosen
 
 
 def _counted_finely(

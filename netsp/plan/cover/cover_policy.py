@@ -19,6 +19,9 @@ class TourSearchPolicy:
         Maximum number of rounds.
     rounds_per_visit
         Number of rounds for each visit of the first tour, if these are more than the maximum.
+    insertion_tours
+        Number of tours that insertions build from the start alone, of which the cheapest is the
+        first tour if it is cheaper than that of a greedy cover.
     idle_rounds_per_visit
         Number of rounds without a gain after which the search ends, for each place of the tour
         (its visits and the start).
@@ -29,6 +32,9 @@ class TourSearchPolicy:
     run_share, random_share
         Shares of rounds that remove a run of the tour, and random viewpoints. The other rounds
         remove the viewpoints nearest to one of them.
+    local_share
+        Share of rounds that add only viewpoints which see something that removed ones saw. The
+        other rounds also look for area elsewhere, which takes several times as long.
     min_gain_exponent, max_gain_exponent
         Range of the exponent of the area that a viewpoint adds, which is weighed against its price.
     noise
@@ -56,11 +62,13 @@ class TourSearchPolicy:
 
     max_rounds: int = 5_000
     rounds_per_visit: int = 60
+    insertion_tours: int = 3
     idle_rounds_per_visit: int = 50
     min_gain: float = 1e-4
     max_removed: int = 12
     run_share: float = 0.4
     random_share: float = 0.1
+    local_share: float = 0.8
     min_gain_exponent: float = 0.7
     max_gain_exponent: float = 1.3
     noise: float = 0.22
@@ -76,7 +84,7 @@ class TourSearchPolicy:
 
     def __post_init__(self) -> None:
         check_positive(self)
-        check_shares(self, "run_share", "random_share", "removed_bias")
+        check_shares(self, "run_share", "random_share", "local_share", "removed_bias")
 
 
 @dataclass(frozen=True)
@@ -137,6 +145,8 @@ class CoverPolicy:
     turning_ratios
         Distances from the surface of the points where such detours may turn, as multiples of the
         clearance. A line between points at 2 clears a square edge.
+    turning_patch_ratio
+        Size of the patches before which these points are placed, as a share of the stand-off.
     blocked_ratio
         Length of a leg round a solid, as a multiple of the straight one, if that graph has no path.
     free_turn_deg
@@ -153,11 +163,6 @@ class CoverPolicy:
     max_recounts
         Number of searches for such a tour, each with more area than the one before as long as less
         than the share is seen of the fine patches that a flight counts.
-    min_begun
-        Number of viewpoints of a greedy cover from which on the search for such a tour begins with
-        the fewest ones; fewer are found by the search itself.
-    begun_time_share
-        Share of the remaining time for the choice of these.
     recount_rounds
         Maximum number of rounds of each of these searches after the first.
     tours
@@ -187,25 +192,19 @@ class CoverPolicy:
     samples_per_clearance: float = 2.0
     sparse_neighbours: int = 16
     turning_ratios: tuple[float, ...] = (1.05, 2.0)
+    turning_patch_ratio: float = 0.2
     blocked_ratio: float = 1.5
     free_turn_deg: float = 60.0
     approach_times: tuple[float, ...] = (0.4, 0.8, 1.6, 2.4)
     visit_steps: float = 1.5
     max_recounts: int = 4
-    min_begun: int = 150
-    begun_time_share: float = 0.25
     recount_rounds: int = 500
     more_time_share: float = 0.3
     tours: TourSearchPolicy = TourSearchPolicy()
 
     def __post_init__(self) -> None:
         check_positive(self)
-        for name in (
-            "search_time_share",
-            "max_tether_share",
-            "more_time_share",
-            "begun_time_share",
-        ):
+        for name in ("search_time_share", "max_tether_share", "more_time_share"):
             if getattr(self, name) > 1.0:
                 raise InputError(f"{name}: expected a share up to 1, got {getattr(self, name)!r}")
         for name in ("standoff_ratios", "heading_offsets_deg", "turning_ratios", "approach_times"):

@@ -55,6 +55,7 @@ class RoundSettings(NamedTuple):
     max_removed: int
     run_share: float
     random_share: float
+    local_share: float
     min_gain_exponent: float
     max_gain_exponent: float
     noise: float
@@ -84,8 +85,9 @@ class _Work(NamedTuple):
         Random factor (n,) of each candidate.
     legs
         Lengths (n,) of the legs to the visits of the tour; only the first ones are used.
-    is_removed, is_tried
-        Masks (n,) of removed viewpoints, and of places at which moves are tried.
+    is_removed, is_tried, is_useful
+        Masks (n,) of removed viewpoints, of places at which moves are tried, and of places that
+        may be added.
     """
 
     views: Ints
@@ -98,6 +100,7 @@ class _Work(NamedTuple):
     legs: Floats
     is_removed: Bools
     is_tried: Bools
+    is_useful: Bools
 
 
 @kernel
@@ -127,19 +130,7 @@ def search_rounds(
     idle : int
         Number of rounds since the last gain; that of all rounds if there was none.
     """
-    n, m = len(cover.prices), len(cover.areas)
-    work = _Work(
-        np.zeros(m, dtype=np.int64),
-        np.zeros(n),
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n, dtype=np.int64),
-        np.zeros(n),
-        np.zeros(n, dtype=np.int64),
-        np.ones(n),
-        np.zeros(n),
-        np.zeros(n, dtype=np.bool_),
-        np.zeros(n, dtype=np.bool_),
-    )
+    work = _work(cover)
     current_cost, best_cost = tour_cost(cover, current), tour_cost(cover, best)
     idle = 0
     for number in range(rounds[0], rounds[1]):
@@ -157,6 +148,50 @@ def search_rounds(
         if cost < best_cost:
             best, best_cost = tour, cost
     return current, best, idle
+
+
+@kernel
+def insertion_tour(
+    cover: CoverArrays, settings: RoundSettings, state: npt.NDArray[np.uint64]
+) -> Ints:
+    """Return a short tour that sees the needed area, built from the start alone by the insertions
+    of a round; an empty one if no tour sees as much.
+
+    Parameters
+    ----------
+    state : ndarray of uint64, shape (1,)
+        State of the random generator (`netsp.base.compiled.rng`).
+    """
+    work = _work(cover)
+    tour = np.zeros(len(cover.prices), dtype=np.int64)
+    covered = _cover_again(cover, settings, tour, 1, math.inf, work, state)
+    if covered == 0:
+        return tour[:0]
+    kept = _drop_spare(cover, settings, tour, covered, work)
+    out = tour[:kept].copy()
+    min_gain = settings.min_move_gain * max(tour_cost(cover, out), 1.0)
+    work.is_tried[:] = True
+    shorten_in_place(cover.distances, out, work.is_tried, settings.max_segment, min_gain)
+    return out
+
+
+@kernel
+def _work(cover: CoverArrays) -> _Work:
+    """Return work arrays."""
+    n, m = len(cover.prices), len(cover.areas)
+    return _Work(
+        np.zeros(m, dtype=np.int64),
+        np.zeros(n),
+        np.zeros(n, dtype=np.int64),
+        np.zeros(n, dtype=np.int64),
+        np.zeros(n),
+        np.zeros(n, dtype=np.int64),
+        np.ones(n),
+        np.zeros(n),
+        np.zeros(n, dtype=np.bool_),
+        np.zeros(n, dtype=np.bool_),
+        np.zeros(n, dtype=np.bool_),
+    )
 
 
 @kernel
@@ -267,7 +302,8 @@ def _cover_again(
     max_missing = settings.rounding * cover.needed
     if missing <= max_missing:
         return count
-    n_candidates = _find_candidates(cover, work)
+    is_local = work.is_removed.any() and uniform(state) < settings.local_share
+    n_candidates = _find_candidates(cover, is_local, work)
     cost = 0.0
     for k in range(count):
         work.legs[k] = cover.distances[tour[k - 1] if k else tour[count - 1], tour[k]]
@@ -312,9 +348,14 @@ def _cover_again(
 
 
 @kernel
-def _find_candidates(cover: CoverArrays, work: _Work) -> int:
-    """Find the places that see an unseen patch, and what they see of these; return their
-    number."""
+def _find_candidates(cover: CoverArrays, is_local: bool, work: _Work) -> int:
+    """Find the places that see an unseen patch, and what they see of these; return their number.
+
+    Parameters
+    ----------
+    is_local : bool
+        Whether only the places that see a patch which a removed viewpoint saw count.
+    """
     work.gains[:] = 0.0
     work.n_unseen[:] = 0
     for patch in range(len(cover.areas)):
@@ -322,12 +363,27 @@ def _find_candidates(cover: CoverArrays, work: _Work) -> int:
             for j in range(cover.place_starts[patch], cover.place_starts[patch + 1]):
                 work.gains[cover.places[j]] += cover.areas[patch]
                 work.n_unseen[cover.places[j]] += 1
+    if is_local:
+        _find_local(cover, work)
     count = 0
     for place in range(len(cover.prices)):
-        if work.n_unseen[place] > 0:
+        if work.n_unseen[place] > 0 and (work.is_useful[place] or not is_local):
             work.candidates[count] = place
             count += 1
     return count
+
+
+@kernel
+def _find_local(cover: CoverArrays, work: _Work) -> None:
+    """Mark the places that see a patch which only removed viewpoints saw."""
+    work.is_useful[:] = False
+    for place in range(len(cover.prices)):
+        if work.is_removed[place]:
+            for i in range(cover.patch_starts[place], cover.patch_starts[place + 1]):
+                patch = cover.patches[i]
+                if work.views[patch] == 0:
+                    for j in range(cover.place_starts[patch], cover.place_starts[patch + 1]):
+                        work.is_useful[cover.places[j]] = True
 
 
 @kernel
@@ -367,11 +423,11 @@ def _find_insertions(
 @kernel
 def _find_insertion(cover: CoverArrays, tour: Ints, count: int, c: int, work: _Work) -> None:
     """Find the position in a tour at which inserting a candidate adds least."""
-    place = work.candidates[c]
+    distances = cover.distances[work.candidates[c]]
     min_added, at = math.inf, count - 1
-    before = cover.distances[tour[count - 1], place]
+    before = distances[tour[count - 1]]
     for k in range(count):
-        to_visit = cover.distances[tour[k], place]
+        to_visit = distances[tour[k]]
         added = before + to_visit - work.legs[k]
         if added < min_added:
             min_added, at = added, k - 1

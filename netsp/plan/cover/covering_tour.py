@@ -28,7 +28,12 @@ from netsp.base.clock import Clock
 from netsp.base.compiled.rng import seeded
 from netsp.plan.cover.choose import choose_greedily, prune
 from netsp.plan.cover.cover_policy import TourSearchPolicy
-from netsp.plan.cover.covering_rounds import CoverArrays, RoundSettings, search_rounds
+from netsp.plan.cover.covering_rounds import (
+    CoverArrays,
+    RoundSettings,
+    insertion_tour,
+    search_rounds,
+)
 from netsp.plan.cover.tour_improvement import nearest_neighbour_tour, shorten, tour_length
 
 
@@ -103,7 +108,7 @@ def cheapest_tour(
         Called with a line of text now and then.
     first : ndarray of int, optional
         Tour with which the search begins; viewpoints are added to it until it sees enough. By
-        default the tour of a greedy cover.
+        default the cheapest of the tours of a greedy cover and of insertions from the start alone.
 
     Returns
     -------
@@ -111,11 +116,15 @@ def cheapest_tour(
         Places in their order, the start first.
     """
     policy = policy or TourSearchPolicy()
-    best = current = _first_tour(problem, policy, first)
     cover, state = problem.arrays(), seeded(rng)
+    settings = RoundSettings(*(getattr(policy, name) for name in RoundSettings._fields))
+    tours = [_first_tour(problem, policy, first)]
+    if first is None:
+        tours += [insertion_tour(cover, settings, state) for _ in range(policy.insertion_tours)]
+    best = current = min((tour for tour in tours if len(tour)), key=problem.cost)
     max_rounds = max(policy.max_rounds, policy.rounds_per_visit * (len(best) - 1))
     policy = replace(policy, max_rounds=max_rounds)
-    settings = RoundSettings(*(getattr(policy, name) for name in RoundSettings._fields))
+    settings = settings._replace(max_rounds=max_rounds)
     idle_rounds = done = reported = 0
     while done < policy.max_rounds and not clock.is_up and len(best) > 1:
         if on_progress is not None and done >= reported:

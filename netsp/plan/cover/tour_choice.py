@@ -93,16 +93,8 @@ class TourChooser:
     fine: Patches
     classes: TetherClasses | None = None
 
-    def choose(
-        self, found: Viewpoints, objective: Objective, begun: Ints | None = None
-    ) -> TourChoice:
-        """Return viewpoints that see the share, in the order of a short tour.
-
-        Parameters
-        ----------
-        begun : ndarray of int, optional
-            Numbers of viewpoints with which the search for a tour of least time begins.
-        """
+    def choose(self, found: Viewpoints, objective: Objective) -> TourChoice:
+        """Return viewpoints that see the share, in the order of a short tour."""
         if objective == VIEWPOINTS:
             return self._choose_fewest(found)
         policy, areas = self.viewer.policy, self.viewer.patches.areas
@@ -119,7 +111,7 @@ class TourChooser:
             np.r_[0.0, self.speed * self.visit_times(found)],
         )
         rng = np.random.default_rng(self.seed)
-        tour = None if begun is None else np.r_[0, 1 + begun]
+        tour: Ints | None = None
         tours = policy.tours
         for _ in range(policy.max_recounts):
             tour = cheapest_tour(problem, rng, self.clock, tours, self.on_progress, tour)
@@ -140,8 +132,8 @@ class TourChooser:
         )
 
     def seen_in_flight(self, found: Viewpoints) -> Bools:
-        """Return the patches (n, m) that a flight sees from each viewpoint: those in view both at
-        its heading and at that where the turn to it ends.
+        """Return the patches (n, m) that a flight sees from each viewpoint: those in view at the
+        heading where the turn to its own ends.
 
         The robot only passes viewpoints without a heading, so a patch must be in view from some
         distance away, too.
@@ -149,7 +141,7 @@ class TourChooser:
         early = self._early_headings(found)
         sees = found.sees.copy()
         for k in np.flatnonzero(~np.isnan(early) & (early != found.headings)):
-            sees[k] &= self.viewer.seen_from(found.places[k], float(early[k]))
+            sees[k] = self.viewer.seen_from(found.places[k], float(early[k]))
         passing = replace(self.viewer, camera=self._camera_in_passing())
         for k in np.flatnonzero(np.isnan(found.headings)):
             sees[k] &= passing.seen_from(found.places[k], math.nan)

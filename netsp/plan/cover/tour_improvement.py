@@ -155,11 +155,11 @@ def _best_segment_move(
                     continue
                 c, d = tour[place], tour[place + 1] if place + 1 < count else tour[0]
                 left = saved + distances[c, d]
-                gain = left - distances[c, first] - distances[last, d]
+                gain = left - distances[first, c] - distances[last, d]
                 if gain > best:
                     best, best_begin, best_size = gain, begin, size
                     best_place, best_reversed = place, False
-                gain = left - distances[c, last] - distances[first, d]
+                gain = left - distances[last, c] - distances[first, d]
                 if gain > best:
                     best, best_begin, best_size = gain, begin, size
                     best_place, best_reversed = place, True

@@ -15,7 +15,7 @@ import numpy as np
 from netsp.base.arrays import Bools, Floats, Ints
 from netsp.plan.cover.cover_policy import CoverPolicy
 from netsp.plan.cover.leg_classes import TetherClasses
-from netsp.plan.cover.viewpoints import Viewer, spread_out
+from netsp.plan.cover.viewpoints import Viewer, coarsen, spread_out
 
 
 def estimate_distances(
@@ -67,7 +67,9 @@ def estimate_distances(
 def _turning_points(viewer: Viewer, policy: CoverPolicy) -> Floats:
     """Return points (k, 3) where paths turn round solids: they keep the clearance, and stand off
     from the surface by some multiples of it."""
-    patches, room = viewer.patches, max(viewer.clearance, 0.05 * viewer.standoff)
+    # fine patches are many, and points half a stand-off apart are chosen from them
+    patches = coarsen(viewer.patches, policy.turning_patch_ratio * viewer.standoff)
+    room = max(viewer.clearance, 0.05 * viewer.standoff)
     shells = [patches.centres + ratio * room * patches.normals for ratio in policy.turning_ratios]
     kept = [points[viewer.field.distance(points) >= viewer.clearance] for points in shells]
     return np.vstack(
