@@ -24,7 +24,6 @@ from netsp.plan.cover.viewpoints import (
     coarsen,
     find_more_viewpoints,
     find_viewpoints,
-    share_seen,
 )
 from netsp.world.mission.equipment import Camera
 from netsp.world.mission.mission import Mission, MissionWaypoint, Viewpoint
@@ -58,9 +57,11 @@ class Cover(ComparesArrays):
         Lower bound on the number of viewpoints among these that see as much.
     seen : float
         Share of the whole surface that is seen from the waypoints, on the patches by which they
-        were chosen. The choice makes the most of these, so `counted` is a little smaller.
+        were chosen. The choice makes the most of these, so `counted` is a little smaller. With the
+        objective `time`, what is seen is what a flight sees, whose turns may end a few degrees
+        early; with `viewpoints`, it is what is seen at the headings of the waypoints.
     counted : float
-        Same share on the finer patches that a flight counts.
+        Same share on the finer patches that a flight counts, seen where its turns end.
     visible : float
         Share of it that is seen from any of the candidates.
     visible_patches : ndarray of bool, shape (m,)
@@ -233,8 +234,10 @@ def cover(
         chooser = TourChooser(
             viewer, start_place, mission.speed, share, clock, seed, report, fine, classes
         )
+        if objective == TIME:
+            found = replace(found, sees=chooser.seen_in_flight(found))
         choice = chooser.choose(found, objective)
-        counted = share_seen(replace(viewer, patches=fine), found.subset(choice.order))
+        counted = chooser.fine_share(found.subset(choice.order))
         return _build_cover(mission, patches, found, choice, counted, reach, share, objective)
 
 

@@ -94,12 +94,15 @@ class TourChooser:
     classes: TetherClasses | None = None
 
     def choose(self, found: Viewpoints, objective: Objective) -> TourChoice:
-        """Return viewpoints that see the share, in the order of a short tour."""
+        """Return viewpoints that see the share, in the order of a short tour.
+
+        For a tour of least time, the viewpoints see what `seen_in_flight` returns.
+        """
         if objective == VIEWPOINTS:
             return self._choose_fewest(found)
         policy, areas = self.viewer.policy, self.viewer.patches.areas
         visible_share = float(areas[found.sees.any(axis=0)].sum() / areas.sum())
-        matrix, weights = merge_patches(self.seen_in_flight(found), areas)
+        matrix, weights = merge_patches(found.sees, areas)
         area = float(weights.sum())
         distances = self._distances(found.places)
         self.on_progress(f"choosing among {len(found)} viewpoints with their tour")

@@ -178,15 +178,6 @@ class Viewer:
         )
 
 
-def share_seen(viewer: Viewer, views: Viewpoints) -> float:
-    """Return the share, by area, of a viewer's patches that are seen from places and headings."""
-    areas = viewer.patches.areas
-    seen = np.zeros(len(areas), dtype=bool)
-    for place, heading in zip(views.places, views.headings, strict=True):
-        seen |= viewer.seen_from(place, float(heading))
-    return float(areas[seen].sum() / areas.sum())
-
-
 def find_viewpoints(
     viewer: Viewer, rng: np.random.Generator, clock: Clock, on_progress: Callable[[str], None]
 ) -> Viewpoints:
