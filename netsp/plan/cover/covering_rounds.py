@@ -302,7 +302,7 @@ def _cover_again(
     max_missing = settings.rounding * cover.needed
     if missing <= max_missing:
         return count
-    is_local = work.is_removed.any() and uniform(state) < settings.local_share
+    is_local = bool(work.is_removed.any()) and uniform(state) < settings.local_share
     n_candidates = _find_candidates(cover, is_local, work)
     cost = 0.0
     for k in range(count):
