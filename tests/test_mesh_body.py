@@ -187,11 +187,11 @@ def test_a_hollow_half_ball_is_a_sheet_unless_the_scene_says_solid():
 
 
 @pytest.mark.parametrize(
-    ("scale", "message"), [(1000.0, "in millimetres"), (0.01, "not in metres"), (1.0, None)]
+    ("size", "message"), [(1000.0, "in millimetres"), (0.01, "not in metres"), (1.0, None)]
 )
-def test_a_mesh_in_another_unit_is_named(scale, message):
-    notes = body_of_mesh(scale * BALL.vertices, BALL.faces).notes
-    assert [message] == [message for n in notes if message in n] if message else notes == ()
+def test_a_mesh_in_another_unit_is_named(tmp_path, size, message):
+    notes = scene_of_file(tmp_path, BALL.copy().apply_scale(size)).reading_notes()
+    assert [message] == [message for n in notes if message in n] if message else notes == []
 
 
 def test_plates_thinner_than_a_voxel_stay_solid_wherever_they_are():
@@ -259,6 +259,21 @@ def test_a_mesh_in_millimetres_is_told_the_scale(tmp_path):
         scene.reading_notes()
 
 
+@pytest.mark.parametrize("size", [0.21, 2.0, 20.0, 199.0])
+def test_millimetres_taken_for_metres_are_noted_at_each_size_of_a_structure(tmp_path, size):
+    """A mesh of a size without a note in metres has one, or is refused, in millimetres."""
+    path = tmp_path / "part.stl"
+    trimesh.creation.box((1000.0 * size, 500.0 * size, 500.0 * size)).export(path)
+    hint = "in millimetres"
+    try:
+        notes = Scene.model_validate({"mesh": {"file": str(path)}}).reading_notes()
+    except InputError as error:
+        notes = [str(error)]
+    assert any(hint in n and '"scale": 0.001' in n for n in notes)
+    scaled = Scene.model_validate({"mesh": {"file": str(path), "scale": 0.001}})
+    assert scaled.reading_notes() == []
+
+
 def seen_from_six_sides(scene, clearance=0.3):
     field = scene.field()
     camera = Camera(range=6.0, field_of_view=120.0, patch=0.15)
@@ -291,6 +306,59 @@ def test_both_sides_of_a_sheet_count_and_neither_side_of_a_slit(tmp_path):
     area, _ = seen_from_six_sides(scene_of_file(tmp_path, pair, voxel=0.03))
     rim = 4.0 - (2.0 - 2.0 * 0.06 * np.tan(np.radians(75.0))) ** 2
     assert 23.5 < area < 24.0 + 2.0 * rim + 0.5
+
+
+def scene_of_squares(folder, squares, **more):
+    """Scene of a mesh of parallelograms, each by a corner and two sides, as sheets."""
+    corners = [(a, np.add(a, u), np.add(np.add(a, u), v), np.add(a, v)) for a, u, v in squares]
+    faces = [[4 * k + i for i in corner] for k in range(len(squares)) for corner in HALVES]
+    mesh = trimesh.Trimesh(np.array(corners).reshape(-1, 3), faces, process=False)
+    return scene_of_file(folder, mesh, surface="sheet", **more)
+
+
+HALVES = ([0, 1, 2], [0, 2, 3])
+"""Corners of the two triangles of a parallelogram."""
+
+
+def share_seen_from(scene, eyes):
+    """Area of the patches of a scene, and the share that a camera sees that looks at the origin."""
+    field, camera = scene.field(), Camera(range=9.0, field_of_view=120.0, patch=0.15)
+    patches = surface_patches(scene, field, 0.15, np.array(eyes), clearance=0.1)
+    coverage = Coverage(patches, field, camera)
+    for eye in np.array(eyes):
+        coverage.look(eye, np.arctan2(-eye[1], -eye[0]))
+    return float(patches.areas.sum()), coverage.share
+
+
+def test_a_sheet_is_seen_up_to_its_seam_with_another(tmp_path):
+    """Between sheets that are 45 degrees apart and 0.2 m thick because of the voxels, the field is
+    solid for a quarter of their length."""
+    c, h = np.cos(np.pi / 8), np.sin(np.pi / 8)
+    squares = [((0, -0.5, 0), (c, 0, s * h), (0, 1, 0)) for s in (-1, 1)]
+    scene = scene_of_squares(tmp_path, squares, voxel=0.05)
+    assert scene.field().distance([0.2, 0, 0]) < 0
+    area, share = share_seen_from(scene, [(5.0, 0.0, 0.0), (-5.0, 0.0, 0.0)])
+    assert area == pytest.approx(4.0, rel=0.02)
+    assert share > 0.99
+
+
+def test_what_is_seen_between_narrow_slats_counts_by_its_area(tmp_path):
+    """Slats narrower than a patch hide 0.6 of one side of a plate; the backs of the slats, which
+    cannot be faced, do not count."""
+    slats = [((x, -0.5, 0.01), (0.03, 0, 0), (0, 1, 0)) for x in np.arange(20) * 0.05 - 0.49]
+    plate = ((-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0))
+    scene = scene_of_squares(tmp_path, [plate, *slats], voxel=0.02)
+    _, share = share_seen_from(scene, [(0.3, 0.0, 4.0), (-0.3, 0.0, -4.0)])
+    assert share == pytest.approx(2.0 / 2.6, abs=0.03)
+
+
+def test_a_place_is_hidden_if_a_ray_to_it_ends_early():
+    rng = np.random.default_rng(3)
+    tree = FaceTree.build(rng.normal(size=(40, 3, 3)))
+    eye, places = rng.normal(size=3) * 3.0, rng.normal(size=(500, 3)) * 2.0
+    lengths = tree.ray_lengths(np.broadcast_to(eye, places.shape), places - eye)
+    assert (tree.blocks(eye, places) == (lengths < 1.0)).all()
+    assert 50 < tree.blocks(eye, places).sum() < 450
 
 
 @pytest.mark.parametrize(("degrees", "voxel", "is_noted"), [(15, 0.02, True), (90, 0.005, False)])

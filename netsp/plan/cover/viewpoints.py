@@ -299,7 +299,7 @@ def coarsen(patches: Patches, size: float) -> Patches:
     if len(sides):
         sides = np.unique(which[sides], axis=0)
         sides = sides[sides[:, 0] != sides[:, 1]]
-    return Patches(patches.centres[first], patches.normals[first], areas, sides)
+    return Patches(patches.centres[first], patches.normals[first], areas, sides, patches.sight)
 
 
 def spread_out(points: Floats, apart: float, max_count: int | None = None) -> Ints:

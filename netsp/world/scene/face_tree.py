@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.base.arrays import Floats, Ints
+from netsp.base.arrays import Bools, Floats, Ints
 from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.compiled.kernel import kernel
 
@@ -70,6 +70,10 @@ class FaceTree:
         end_if_abandoned()
         rays = np.ascontiguousarray(np.hstack([starts, directions]))
         return np.asarray(first_hits(self.arrays, rays))
+
+    def blocks(self, eye: Floats, places: Floats) -> Bools:
+        """Return whether a face lies between a point (3,) and each of places (n, 3)."""
+        return np.asarray(are_blocked(self.arrays, eye, np.ascontiguousarray(places)))
 
 
 LEAF_FACES = 6
@@ -229,6 +233,40 @@ def _first_hit(tree: Tree, rays: Floats, i: int) -> float:
         for s in range(nodes[n, BEGIN], nodes[n, END]):
             best = min(best, _face_hit(triangles, s, rays, i))
     return float(best)
+
+
+@kernel
+def are_blocked(tree: Tree, eye: Floats, places: Floats) -> Bools:
+    """Return whether a face lies between a point (3,) and each of places (n, 3)."""
+    out = np.empty(len(places), dtype=np.bool_)
+    rays = np.empty((1, 6))
+    rays[0, :3] = eye
+    for i in range(len(places)):
+        rays[0, 3:] = places[i] - eye
+        out[i] = _is_blocked(tree, rays)
+    return out
+
+
+@kernel
+def _is_blocked(tree: Tree, rays: Floats) -> bool:
+    """Return whether ray 0 meets a face before its length is 1."""
+    triangles, nodes, boxes, _ = tree
+    waiting = np.empty(128, dtype=np.int64)
+    waiting[0] = 0
+    left = 1
+    while left > 0:
+        left -= 1
+        n = waiting[left]
+        if not _meets_box(boxes, n, rays, 0, 1.0):
+            continue
+        if nodes[n, LEFT] >= 0:
+            waiting[left], waiting[left + 1] = nodes[n, LEFT], nodes[n, RIGHT]
+            left += 2
+            continue
+        for s in range(nodes[n, BEGIN], nodes[n, END]):
+            if _face_hit(triangles, s, rays, 0) < 1.0:
+                return True
+    return False
 
 
 @kernel

@@ -154,7 +154,6 @@ class _Builder:
         none = self.faces[:0]
         fans = np.vstack(self.fans) if self.fans else none
         vertices = np.vstack([self.vertices, *self.apexes]) if self.apexes else self.vertices
-        self._note_extent()
         return MeshBody(
             vertices,
             np.vstack([none, *self.solid, fans]),
@@ -169,20 +168,6 @@ class _Builder:
         """Return the share and the number of edges with one face only."""
         edges = edges_of(self.welded_faces)
         return edges.open_count / max(len(edges.ends), 1), edges.open_count
-
-    def _note_extent(self) -> None:
-        """Note a size that a structure in metres seldom has."""
-        extent = float(np.ptp(self.vertices, axis=0).max())
-        if extent > self.policy.max_extent_m:
-            self.notes.append(
-                f'the mesh is {extent:.4g} m across; if the file is in millimetres, add "scale": '
-                "0.001"
-            )
-        elif extent < self.policy.min_extent_m:
-            self.notes.append(
-                f'the mesh is {extent:.3g} m across; if the file is not in metres, add "scale" '
-                "with the metres of its unit"
-            )
 
     def _drop_doubles(self) -> None:
         """Keep one of faces that lie back to back with water on both sides."""

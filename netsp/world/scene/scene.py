@@ -396,8 +396,24 @@ class Scene(FileModel):
         if self.mesh is not None:
             self._check_size(parts["mesh"][0], policy or MeshPolicy())
             body = body_of_mesh(*parts["mesh"], surface=self.mesh.surface, policy=policy)
-            found = {"mesh": replace(body, thickness=self.mesh.thickness), **found}
+            notes = (*body.notes, *self._size_notes(parts["mesh"][0], policy or MeshPolicy()))
+            body = replace(body, thickness=self.mesh.thickness, notes=notes)
+            found = {"mesh": body, **found}
         return found
+
+    def _size_notes(self, vertices: Floats, policy: MeshPolicy) -> list[str]:
+        """Return a note on a size that a structure in metres seldom has."""
+        assert self.mesh is not None
+        size, scale = float(np.ptp(vertices, axis=0).max()), self.mesh.scale
+        if policy.min_extent_m <= size <= policy.max_extent_m:
+            return []
+        if scale != 1.0:
+            return [f"mesh.scale: {scale:g} makes the mesh {size:.4g} m across"]
+        if size > policy.max_extent_m:
+            hint = 'if the file is in millimetres, add "scale": 0.001'
+        else:
+            hint = 'if the file is not in metres, add "scale" with the metres of its unit'
+        return [f"the mesh is {size:.4g} m across; {hint}"]
 
     def _check_size(self, vertices: Floats, policy: MeshPolicy) -> None:
         """Raise InputError if the scale makes the mesh so small or large that no robot inspects

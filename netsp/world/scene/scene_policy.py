@@ -109,7 +109,8 @@ class MeshPolicy:
         to be a candidate for the surface of a solid. It is about 1 where such faces enclose one,
         and 0.5 behind a face on its own.
     min_extent_m, max_extent_m
-        Sizes of a mesh, metres, outside of which a note doubts its unit.
+        Sizes of a mesh, metres, outside of which a note doubts its unit. Their ratio is 1000, so a
+        mesh in millimetres that is read in metres is outside if its true size is not.
     min_allowed_extent_m, max_allowed_extent_m
         Sizes of a mesh, metres, outside of which a scene is refused.
     """
@@ -122,7 +123,7 @@ class MeshPolicy:
     min_solid_faces: int = 4
     min_loose_winding: float = 0.75
     min_extent_m: float = 0.2
-    max_extent_m: float = 250.0
+    max_extent_m: float = 200.0
     min_allowed_extent_m: float = 0.01
     max_allowed_extent_m: float = 5_000.0
 

@@ -197,7 +197,7 @@ class _Triangles:
             if share > max_hidden_share:
                 notes.append(
                     f"{percent(share)} of the surface is sides of sheets within the thickness of "
-                    f"others: hidden from cameras; voxels smaller than {size:.3g} show more of them"
+                    f"others: taken as solid; voxels smaller than {size:.3g} show more of them"
                 )
         end_if_abandoned()
         enclosed = lattice.unreached(values)

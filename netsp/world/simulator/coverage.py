@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import NamedTuple
 
 import numpy as np
@@ -21,13 +22,20 @@ from netsp.base.errors import InputError
 from netsp.base.validated import shown_names
 from netsp.world.mission.equipment import Camera
 from netsp.world.scene.field import DistanceField
+from netsp.world.scene.mesh_body import MeshBody
 from netsp.world.scene.sampling import Field, lowest_along, lowest_along_each
 from netsp.world.scene.scene import Scene
 from netsp.world.scene.scene_policy import GridPolicy
 from netsp.world.scene.shapes import HalfSpace
 from netsp.world.scene.surfaces import drawn_points, extent, surface_of
 from netsp.world.simulator.environment_policy import CoveragePolicy
-from netsp.world.simulator.mesh_patches import facing_triangles, mesh_patches, triangle_areas
+from netsp.world.simulator.face_sight import FaceSight
+from netsp.world.simulator.mesh_patches import (
+    face_patches,
+    facing_triangles,
+    mesh_patches,
+    triangle_areas,
+)
 from netsp.world.simulator.outer_water import OuterWater, exposed
 
 
@@ -44,12 +52,15 @@ class Patches(ComparesArrays):
     sides
         Pairs (m, 2) of patches that are the two sides of a sheet. The sheet is seen if either side
         is; the area of the second side is 0.
+    sight
+        Sight past the faces of the scene's mesh; None where the field of the scene decides.
     """
 
     centres: Floats
     normals: Floats
     areas: Floats
     sides: Ints
+    sight: FaceSight | None = dataclass_field(default=None, compare=False)
 
 
 def surface_patches(
@@ -65,7 +76,8 @@ def surface_patches(
     """Return the surface of a scene as patches with sides of about `size`, metres.
 
     Parts inside another solid are left out. Of a mesh, the outsides of its solids and both sides of
-    its sheets count (`netsp.world.scene.mesh_body`).
+    its sheets count (`netsp.world.scene.mesh_body`). Its faces are where the file has them, unless
+    the scene states a thickness of sheets.
 
     Parameters
     ----------
@@ -84,42 +96,72 @@ def surface_patches(
     InputError
         `inspect` names no solid, or no surface is left to be seen.
     """
-    centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+    groups = list(_solid_groups(scene, field, size, places, inspect, policy))
+    bodies = _mesh_bodies(scene, inspect)
+    sight = None
+    if scene.mesh is not None and scene.mesh.thickness is None:
+        sight = FaceSight.build(scene, bodies["mesh"], field.voxel)
+    for name, body in bodies.items():
+        if name in (("mesh",) if inspect is None else inspect):  # the floor only by name
+            faces = sight if name == "mesh" else None
+            groups.append(_mesh_group(field, body, faces, size, places, policy, clearance))
     pairs = np.zeros((0, 2), dtype=np.int64)
-    for vertices, faces, own_field in _surfaces(scene, field, places, inspect):
-        triangles = divided_triangles(vertices[faces], size, policy.max_patches)
-        own_areas = triangle_areas(triangles)
-        good = own_areas > 0.5e-12
-        middle = triangles[good].mean(axis=1)
-        if len(middle):
-            # facets of round solids lie a little inside
-            outward = own_field.gradient(middle)
-            centres.append(middle - own_field.distance(middle)[:, None] * outward)
-            normals.append(outward)
-            areas.append(own_areas[good])
-    for c, n, a in _shown_meshes(scene, field, size, places, inspect, policy, clearance):
-        centres.append(c)
-        normals.append(n)
-        areas.append(a)
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
+        first = sum(len(group.areas) for group in groups)
         points = drawn_points(scene)
         sheet = field.distance(points) < -0.5 * (field.voxel or 0.0)
         for k, side in enumerate(cloud_sides(field, points)):
             chosen = sheet if k else np.ones(len(points), dtype=bool)
-            centres.append(side[chosen])
-            normals.append(field.gradient(side[chosen]))
-            areas.append(np.full(int(chosen.sum()), 1.0 - k))
-        cloud = sum(map(len, centres[:-2])) + np.flatnonzero(sheet)
-        pairs = np.column_stack([cloud, sum(map(len, centres[:-1])) + np.arange(len(cloud))])
-    c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
-    bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
-    if not a[bare].any():
+            areas = np.full(int(chosen.sum()), 1.0 - k)
+            groups.append(_Group(side[chosen], field.gradient(side[chosen]), areas, field))
+        pairs = np.flatnonzero(sheet)[:, None] + first
+        pairs = np.hstack([pairs, first + len(points) + np.arange(len(pairs))[:, None]])
+    bare = [g.field.distance(g.centres + 0.1 * size * g.normals) > 0.0 for g in groups]
+    kept = np.concatenate([np.zeros(0, dtype=bool), *bare])
+    if not any(g.areas[b].any() for g, b in zip(groups, bare, strict=True)):
         raise InputError(
             "scene: there is no surface to be seen (half spaces and sea floors do not count); "
             "expected solids, a mesh or a cloud, and if `inspect` names some, one with a surface"
         )
-    place = np.cumsum(bare) - 1
-    return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
+    place = np.cumsum(kept) - 1
+    return Patches(
+        np.vstack([g.centres for g in groups])[kept],
+        np.vstack([g.normals for g in groups])[kept],
+        np.concatenate([g.areas for g in groups])[kept],
+        place[pairs[kept[pairs].all(axis=1)]],
+        sight,
+    )
+
+
+class _Group(NamedTuple):
+    """Centres (n, 3), normals (n, 3) and areas (n,) of patches, and the field of the solids that
+    may cover them."""
+
+    centres: Floats
+    normals: Floats
+    areas: Floats
+    field: DistanceField
+
+
+def _solid_groups(
+    scene: Scene,
+    field: DistanceField,
+    size: float,
+    places: Floats,
+    inspect: tuple[str, ...] | None,
+    policy: CoveragePolicy,
+) -> Iterator[_Group]:
+    """Yield the patches of each solid to be seen."""
+    for vertices, faces, own_field in _surfaces(scene, field, places, inspect):
+        triangles = divided_triangles(vertices[faces], size, policy.max_patches)
+        areas = triangle_areas(triangles)
+        good = areas > 0.5e-12
+        middle = triangles[good].mean(axis=1)
+        if len(middle):
+            # facets of round solids lie a little inside
+            outward = own_field.gradient(middle)
+            centres = middle - own_field.distance(middle)[:, None] * outward
+            yield _Group(centres, outward, areas[good], field)
 
 
 def _surfaces(
@@ -142,33 +184,40 @@ def _surfaces(
     ]
 
 
-def _shown_meshes(
-    scene: Scene,
+def _mesh_bodies(scene: Scene, inspect: tuple[str, ...] | None) -> dict[str, MeshBody]:
+    """Return the bodies of the mesh, which may block sight, and of a sea floor to be seen."""
+    if scene.mesh is None and not (scene.floor is not None and "floor" in (inspect or ())):
+        return {}
+    return scene.mesh_bodies()
+
+
+def _mesh_group(
     field: DistanceField,
+    body: MeshBody,
+    sight: FaceSight | None,
     size: float,
     places: Floats,
-    inspect: tuple[str, ...] | None,
     policy: CoveragePolicy,
     clearance: float,
-) -> Iterator[tuple[Floats, Floats, Floats]]:
-    """Yield centres, normals and areas of the patches of each mesh to be seen."""
-    chosen = ("mesh",) if inspect is None else inspect  # the floor only by name
-    if scene.mesh is None and not (scene.floor is not None and "floor" in chosen):
-        return
+) -> _Group:
+    """Return the patches of a mesh: of its faces as the file has them if there is sight past them,
+    else of its surface in the field."""
+    triangles = divided_triangles(facing_triangles(body), size, policy.max_patches)
+    triangles = triangles[triangle_areas(triangles) > 0.5e-12]
     voxel = field.voxel or 0.0
-    for name, body in scene.mesh_bodies().items():
-        if name not in chosen:
-            continue
-        triangles = divided_triangles(facing_triangles(body), size, policy.max_patches)
-        triangles = triangles[triangle_areas(triangles) > 0.5e-12]
-        if not len(triangles):
-            continue
+    merged_size = policy.mesh_patch_ratio * size
+    if sight is not None:
+        c, n, a = face_patches(field, body, triangles, merged_size, policy.sample_seed)
+        off, around = sight.off, sight.others
+    else:
         thickness = body.thickness or 2.0 * GridPolicy().sheet_voxels * voxel
-        merged_size = policy.mesh_patch_ratio * size
         c, n, a = mesh_patches(field, body, triangles, merged_size, 0.5 * thickness + voxel)
+        off, around = 0.5 * voxel, field
+    if len(c):
         water = OuterWater.about(field, body, clearance, places, policy)
-        shown = exposed(body, water, c, n, clearance, 0.5 * voxel, policy)
-        yield c[shown], n[shown], a[shown]
+        shown = exposed(body, water, c, n, clearance, off, policy)
+        c, n, a = c[shown], n[shown], a[shown]
+    return _Group(c, n, a, around)
 
 
 def cloud_sides(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
@@ -270,15 +319,25 @@ class Coverage:
         max_tilt = math.radians(self.camera.tilt)
         pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -max_tilt), max_tilt)
         half = math.tan(math.radians(0.5 * self.camera.field_of_view))
+        sight = self.patches.sight
+        field = self.field if sight is None else sight.others
+        before = self.seen.copy()
         open_, through = mark_visible(
-            self.field.arrays,
+            field.arrays,
             PatchArrays(self.patches.centres, self.patches.normals, self._shares),
             self.seen,
             self.seen_through,
             CameraView(eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch),
         )
-        self.share += open_
         self.share_through += through
+        if sight is None:
+            self.share += open_
+        else:
+            new = np.flatnonzero(self.seen & ~before)
+            places, normals = self.patches.centres[new], self.patches.normals[new]
+            is_open = sight.is_open(eye, places, normals)
+            self.seen[new[~is_open]] = False
+            self.share += _in_order(self._shares[new[is_open]])
         if len(self.patches.sides):
             a, b = self.patches.sides.T
             for seen in (self.seen, self.seen_through):

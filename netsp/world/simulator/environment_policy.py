@@ -54,6 +54,8 @@ class CoveragePolicy:
     mesh_patch_ratio
         Edge of the cubes in which patches of a mesh are merged, as a multiple of the camera's
         patch. A flight counts these patches; `netsp cover` chooses by coarser ones.
+    sample_seed
+        Seed of the points of a mesh's faces by which its patches are seen or not.
     max_water_cells
         Maximum number of cells along the longest side of a mesh in the search for the water that
         the robot gets to.
@@ -67,6 +69,7 @@ class CoveragePolicy:
 
     max_patches: int = 200_000
     mesh_patch_ratio: float = 0.5
+    sample_seed: int = 1
     max_water_cells: int = 80
     sight_rays: int = 16
     sight_steps: int = 8

@@ -28,6 +28,43 @@ def unit_normals(triangles: Floats) -> Floats:
     return np.asarray(normals / np.where(length > 0.0, length, 1.0))
 
 
+def face_patches(
+    field: DistanceField, body: MeshBody, triangles: Floats, size: float, seed: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return centres (n, 3), normals (n, 3) and areas (n,) of the patches that triangles make.
+
+    Each patch is seen or not by a random point of its area, so shares are right on average however
+    narrow the strips are that other faces hide. Triangles inside the union of overlapping parts
+    make no patch.
+
+    Parameters
+    ----------
+    field : DistanceField
+        Field of the scene.
+    body : MeshBody
+        Body of the mesh.
+    triangles : ndarray, shape (m, 3, 3)
+        Triangles of `facing_triangles`, small ones.
+    size : float
+        Edge of the cubes in which patches are merged, metres.
+    seed : int
+        Seed of the random points.
+    """
+    rng = np.random.default_rng(seed)
+    u, v = np.sqrt(rng.random(len(triangles))), rng.random(len(triangles))
+    weights = np.column_stack([1.0 - u, u * (1.0 - v), u * v])
+    places, normals = np.einsum("nk,nkd->nd", weights, triangles), unit_normals(triangles)
+    buried = -field.distance(places) > _MAX_ERROR_VOXELS * (field.voxel or 0.0)
+    diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
+    before = places[buried] + MeshPolicy().side_share * diagonal * normals[buried]
+    buried[buried] = body.holds(before)
+    places, normals, areas = places[~buried], normals[~buried], triangle_areas(triangles[~buried])
+    # the first of exponential times is that of each triangle as often as its share of the area
+    ranks = rng.exponential(size=len(areas)) / areas
+    chosen, _, summed = merged(places, normals, areas, size, ranks=ranks)
+    return places[chosen], normals[chosen], summed
+
+
 def mesh_patches(
     field: DistanceField, body: MeshBody, triangles: Floats, size: float, max_depth: float
 ) -> tuple[Floats, Floats, Floats]:
@@ -79,7 +116,12 @@ def triangle_areas(triangles: Floats) -> Floats:
 
 
 def merged(
-    centres: Floats, normals: Floats, areas: Floats, size: float, kinds: Bools | None = None
+    centres: Floats,
+    normals: Floats,
+    areas: Floats,
+    size: float,
+    kinds: Bools | None = None,
+    ranks: Floats | None = None,
 ) -> tuple[Ints, Ints, Floats]:
     """Merge patches in a cube of space that face the same of six directions.
 
@@ -93,11 +135,14 @@ def merged(
         Edge of the cubes, metres.
     kinds : ndarray of bool, shape (n,), optional
         Kinds of patches that are not merged with one another.
+    ranks : ndarray, shape (n,), optional
+        Ranks of the patches. The lowest of each cube and direction is chosen; by default, the one
+        in the middle.
 
     Returns
     -------
     chosen : ndarray, shape (k,)
-        Number of the patch in the middle of each cube and direction.
+        Number of the patch that is chosen in each cube and direction.
     which : ndarray, shape (n,)
         Number in `chosen` of the patch that stands for each.
     summed : ndarray, shape (k,)
@@ -110,9 +155,10 @@ def merged(
     key = np.column_stack([cells, facing if kinds is None else 6 * kinds + facing])
     _, which = np.unique(key, axis=0, return_inverse=True)
     which = which.ravel()
-    counts = np.bincount(which)
-    middles = np.column_stack([np.bincount(which, c) for c in centres.T]) / counts[:, None]
-    distances = np.linalg.norm(centres - middles[which], axis=1)
-    order = np.lexsort((distances, which))
+    if ranks is None:
+        counts = np.bincount(which)
+        middles = np.column_stack([np.bincount(which, c) for c in centres.T]) / counts[:, None]
+        ranks = np.linalg.norm(centres - middles[which], axis=1)
+    order = np.lexsort((ranks, which))
     chosen = order[np.r_[True, np.diff(which[order]) > 0]]
     return chosen, which, np.bincount(which, areas).astype(float)
