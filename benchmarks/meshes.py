@@ -99,7 +99,7 @@ class Outcome:
     error: str = ""
 
 
-COVER_LIMITS = 8.0
+COVER_LIMITS = 15.0
 """Time limit of a choice of waypoints, in those of a solution: it measures distances, too."""
 
 WARM_UP_LIMIT = 60.0
@@ -154,7 +154,7 @@ def measured(path: Path, how: str, limit: float, record: Path | None) -> Outcome
     out = Outcome()
     try:
         _measure(path, how, limit, out)
-    except InputError as error:
+    except (InputError, LimitReachedError) as error:
         out.error = str(error)
     if record is not None:
         with record.open("a") as end:
