@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 
@@ -85,7 +84,7 @@ def perpendiculars(step: Floats) -> tuple[Floats, Floats]:
 
 def _is_free(context: PlanningContext, path: Floats) -> bool:
     """Return whether all segments of a path are free."""
-    return all(context.field.line_of_sight(a, b) for a, b in pairwise(path))
+    return context.field.lines_of_sight(path[:-1], path[1:])
 
 
 def _is_seen_from(context: PlanningContext, known_path: Floats, bent: Floats) -> bool:
@@ -96,12 +95,9 @@ def _is_seen_from(context: PlanningContext, known_path: Floats, bent: Floats) ->
     """
     shares = np.linspace(0.0, 1.0, context.policy.detours.n_sight_lines + 2)
     known_points, bent_points = _points_at(known_path, shares), _points_at(bent, shares)
-    lines = (
-        *zip(known_points[1:-1], bent_points[1:-1], strict=True),
-        *zip(known_points[:-1], bent_points[1:], strict=True),
-        *zip(bent_points[:-1], known_points[1:], strict=True),
-    )
-    return all(context.field.line_of_sight(a, b) for a, b in lines)
+    begins = np.vstack([known_points[1:-1], known_points[:-1], bent_points[:-1]])
+    ends = np.vstack([bent_points[1:-1], bent_points[1:], known_points[1:]])
+    return context.field.lines_of_sight(begins, ends)
 
 
 def _is_alike(a: Floats, b: Floats, delta: float) -> bool:

@@ -18,7 +18,7 @@ from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.errors import InputError
 from netsp.world.scene import packing
 from netsp.world.scene.grid import VoxelGrid
-from netsp.world.scene.sampling import Field, lowest_along, sample_many
+from netsp.world.scene.sampling import Field, are_clear, sample_many
 from netsp.world.scene.scene_policy import FieldPolicy
 
 FILE_VERSION = 4
@@ -180,14 +180,26 @@ class DistanceField:
         depth : float
             Depth that is allowed, metres.
         """
+        return self.lines_of_sight(np.asarray(a)[None], np.asarray(b)[None], depth)
+
+    def lines_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
+        """Return whether no point of any of several segments is deeper inside a solid than `depth`,
+        as `line_of_sight`.
+
+        Parameters
+        ----------
+        a, b : array_like, shape (n, 3)
+            Ends, metres.
+        depth : float
+            Depth that is allowed, metres.
+        """
         p, q = self._points(a), self._points(b)
-        step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
+        steps = np.maximum(1e-3 * np.sqrt(((q - p) ** 2).sum(axis=1)), 1e-9)
         if self.voxel is not None:
-            step = min(step, 0.1 * self.voxel)
-        low, _ = lowest_along(
-            self.arrays, p[0], p[1], p[2], q[0], q[1], q[2], max(min(step, depth or step), 1e-9)
-        )
-        return bool(low >= -max(depth, 1e-9))
+            steps = np.minimum(steps, 0.1 * self.voxel)
+        if depth:
+            steps = np.minimum(steps, depth)
+        return bool(are_clear(self.arrays, p, q, np.maximum(steps, 1e-9), -max(depth, 1e-9)))
 
     def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
         """Return a point as floats, after checking that it is free.

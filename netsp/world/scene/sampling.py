@@ -263,6 +263,28 @@ def lowest_along(
         s = min(length, s + max(d, 0.0) + tolerance)
 
 
+@kernel
+def are_clear(field: Field, a: Floats, b: Floats, tolerances: Floats, min_distance: float) -> bool:
+    """Return whether no point of some segments has less than a distance.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (n, 3)
+        Ends of the segments.
+    tolerances : ndarray, shape (n,)
+        Tolerance of `lowest_along` for each segment.
+    min_distance : float
+        The distance, metres; negative inside solids.
+    """
+    for k in range(len(a)):
+        low, _ = lowest_along(
+            field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], tolerances[k]
+        )
+        if low < min_distance:
+            return False
+    return True
+
+
 def lowest_along_each(field: Field, a: Floats, b: Floats, tolerance: float) -> Floats:
     """Return the minimum distance along each of n segments, for kernels that run interpreted.
 
