@@ -125,7 +125,7 @@ def shortest_words(
 
     All neighbours of an open cell are free and of one class, so only the steps that lead further on
     are taken from it (`netsp.world.paths.tree`): the other neighbours are reached as soon around
-    it.
+    it. A target with as many words as it may have is no target any more.
 
     Parameters
     ----------
@@ -150,7 +150,9 @@ def shortest_words(
     word[i, j, k, 0], far[i, j, k, 0], step[i, j, k, 0] = 0, 0, 26
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = ((i * sy + j) * sz + k) * max_words, 0, -1
     bucket[0], empty, now = 0, 0, 0
-    longest = targets.limits.max()
+    limits = targets.limits.copy()
+    targets = Targets(targets.cells, limits)
+    longest = limits.max()
     while empty < BUCKETS and now <= longest:
         entry = bucket[now % BUCKETS]
         if entry < 0:
@@ -171,6 +173,11 @@ def shortest_words(
         done[i, j, k, n] = True
         current_word = word[i, j, k, n]
         x, y, z = i + first[0], j + first[1], k + first[2]
+        if done[i, j, k].all():
+            for t in range(len(targets.cells)):
+                if (targets.cells[t] == np.array([x, y, z])).all():
+                    limits[t] = -1
+                    longest = limits.max()
         if not leads_to_targets(targets, x, y, z, now):
             continue
         is_open = space.open_cells[x, y, z]
