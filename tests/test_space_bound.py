@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.time_flags import NEVER
-from netsp.plan.solve_problem import solve
+from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
@@ -200,12 +200,12 @@ def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypat
     context = PlanningContext.for_mission(mission, scene, scene.field())
     places, clock, heard = Places.for_mission(mission, context.field), Clock(), []
 
-    def solve_until_stopped(problem, time_limit):
+    def solve_until_stopped(graph, solver, time_limit):
         clock.end()  # as Ctrl-C and SIGTERM do
         heard.append(time_limit.is_up and bool(time_limit.flag[0]))
-        return solve(problem, time_limit=time_limit)
+        return solve_graph(graph, solver, time_limit=time_limit)
 
-    monkeypatch.setattr("netsp.plan.space.upright.solve", solve_until_stopped)
+    monkeypatch.setattr("netsp.plan.space.upright.solve_graph", solve_until_stopped)
     bound_by_upright_solids(mission, context, [0, 1], places, clock.part(0.5))
     assert heard == [True]
 

@@ -268,6 +268,14 @@ class BoundPolicy:
     max_classes
         Maximum number of augmented goals, at least 1, for which the robot's clearance is in the
         bound among upright solids; the costs of their legs take eight bytes for each pair.
+    thick_share
+        Share of that time for all obstacles or, if they have too many classes, the thickest, from 0
+        to 1.
+    few_share
+        Share of the rest of that time for few obstacles around which the shortest tours are wound,
+        from 0 to 1; what is then left is for the robot's clearance from these.
+    max_obstacles_added
+        Maximum number of obstacles added to few at a time, at least 1.
     max_detour_ratio
         Longest path considered where no path is known, as a multiple of the straight distance;
         more than 1.
@@ -283,6 +291,9 @@ class BoundPolicy:
 
     upright_share: float = 0.4
     max_classes: int = 4000
+    thick_share: float = 0.2
+    few_share: float = 0.7
+    max_obstacles_added: int = 2
     max_detour_ratio: float = 2.2
     max_leg_gap: float = 2e-3
     min_solve_s: float = 0.3
@@ -294,7 +305,7 @@ class BoundPolicy:
             raise InputError(f"max_detour_ratio: {self.max_detour_ratio}; expected more than 1")
         if not self.min_solve_s > 0.0:
             raise InputError(f"min_solve_s: {self.min_solve_s}; expected more than 0")
-        _check_minimum(self, cell_s=0.0, max_classes=1)
+        _check_minimum(self, cell_s=0.0, max_classes=1, max_obstacles_added=1)
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,11 @@ import numpy as np
 from netsp.base.clock import Clock
 from netsp.base.errors import NetspError
 from netsp.base.geometry import polylines
-from netsp.model.bound_scope import Scope
 from netsp.model.problem import Circle, Polygon, Problem
-from netsp.plan.solve_problem import solve, solve_graph
+from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
+from netsp.plan.space.few_obstacles import FewObstacles, solve_with_few_obstacles
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, PlanningContext
 from netsp.plan.space.potential import BOUND_ROUNDING
@@ -73,13 +73,36 @@ def bound_by_upright_solids(
             obstacles=tuple(obstacles),
             tether_length=max_length,
         )
-        bound = solve(problem, time_limit=clock).bound
     except NetspError:
-        return None  # no bound in the plane, so none in space
-    if bound is None or bound.scope is not Scope.ALL_TOURS:
-        return None
-    with_room = None if clock.is_up else _bound_with_room(problem, context, dip, clock)
-    return max(bound.length, with_room or 0.0) * (1.0 - BOUND_ROUNDING)
+        return None  # no problem in the plane, so no bound from it
+    bound = _bound_in_plane(problem, context, dip, clock)
+    return None if bound is None else bound * (1.0 - BOUND_ROUNDING)
+
+
+def _bound_in_plane(
+    problem: Problem, context: PlanningContext, dip: float, clock: Clock
+) -> float | None:
+    """Return a lower bound on all tours of a problem whose robot keeps its clearance: with all
+    obstacles, if there is a list of their classes, otherwise with few of them."""
+    policy, bounds = context.policy.bound, [0.0]
+    part = clock.part(policy.thick_share)
+    roadmap = _complete_roadmap(problem, policy.max_classes, part)
+    if roadmap is not None:
+        is_whole = len(roadmap.problem.obstacles) == len(problem.obstacles)
+        limit = clock if is_whole else part
+        bounds.append(_bound_with_room(roadmap, context, dip, limit) or 0.0)
+        if is_whole and bounds[-1]:
+            return bounds[-1]
+    solved: FewObstacles | None = None
+    few_clock = clock.part(policy.few_share)
+    for few in solve_with_few_obstacles(problem, few_clock, policy.max_obstacles_added):
+        bounds.append(few.bound)
+        solved = few if few.is_solved else solved
+    if solved is not None and not clock.is_up:
+        roadmap = TautRoadmap(solved.problem, max_classes=policy.max_classes, time_limit=clock)
+        if roadmap.complete:
+            bounds.append(_bound_with_room(roadmap, context, dip, clock) or 0.0)
+    return max(bounds) or None
 
 
 def judged_room(room: float, delta: float) -> float:
@@ -93,27 +116,24 @@ def judged_room(room: float, delta: float) -> float:
 
 
 def _bound_with_room(
-    problem: Problem, context: PlanningContext, dip: float, clock: Clock
+    roadmap: TautRoadmap, context: PlanningContext, dip: float, clock: Clock
 ) -> float | None:
-    """Return a lower bound on all tours of a problem whose robot keeps its clearance, where the
-    obstacles are shrunk by `dip`; None if there are too many classes for it.
+    """Return a lower bound on all tours of a roadmap's problem whose robot keeps its clearance;
+    None if longer paths stand for some legs.
 
     Solve for the shortest tour, measure its legs with the clearance, and solve again, until the
     legs of the shortest tour are measured or the time is up.
     """
-    mission = context.mission
+    mission, problem = context.mission, roadmap.problem
     points = np.vstack([problem.points, mission.start])
     room = min(mission.clearance, float(context.field.distance(points).min()))
     growth = max(0.0, dip + judged_room(room, mission.delta))
     try:
-        roadmap = _complete_roadmap(problem, context.policy.bound.max_classes, clock)
-        if roadmap is None:
-            return None
         graph = roadmap.to_travel_graph()
-        robot_problem = roadmap.problem.model_copy(update={"clearance": growth})
-        legs, best = ClearanceLegs(graph, robot_problem, clock=clock), 0.0
+        legs = ClearanceLegs(graph, problem.model_copy(update={"clearance": growth}), clock=clock)
         if graph.legs_left_out:
-            return None  # longer paths stand for them, which bound nothing
+            return None
+        best = 0.0
         while True:
             known = TravelGraph.from_costs(legs.costs, graph.cluster)
             result = solve_graph(known, "auto", time_limit=clock)
@@ -130,13 +150,13 @@ def _complete_roadmap(problem: Problem, max_classes: int, clock: Clock) -> TautR
     A tether can wind often around a thin post, which makes many classes that no short tour
     needs. A problem with fewer obstacles has no longer tours, so its bound holds.
     """
-    obstacles = sorted(problem.obstacles, key=_girth, reverse=True)
+    obstacles, removed = sorted(problem.obstacles, key=_girth, reverse=True), 1
     while obstacles and not clock.is_up:
         reduced = problem.model_copy(update={"obstacles": tuple(obstacles)})
         roadmap = TautRoadmap(reduced, max_classes=max_classes, time_limit=clock.part(0.5))
         if roadmap.complete:
             return roadmap
-        obstacles.pop()
+        obstacles, removed = obstacles[:-removed], 2 * removed
     return None
 
 
