@@ -9,7 +9,7 @@ shortest tour.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,6 +119,6 @@ def obstacles_in_the_way(problem: Problem, kept: Set[int], path: Floats) -> tupl
     return tuple(others[k] for k in order if inside[k] > 0.0)
 
 
-def _part(word: list[int], obstacles: Set[int]) -> Word:
+def _part(word: Iterable[int], obstacles: Set[int]) -> Word:
     """Return the reduced word of the letters of some obstacles, by their indices from 0."""
     return reduce(letter for letter in word if abs(letter) - 1 in obstacles)
