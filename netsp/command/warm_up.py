@@ -144,7 +144,11 @@ def steps() -> Iterator[Step]:
     from netsp.plan.random_worlds import random_world
     from netsp.plan.solve_problem import solve, solve_graph, travel_graph
     from netsp.plan.solver_table import SOLVERS
+    from netsp.plan.space.mission_policy import MissionPolicy, PotentialPolicy
     from netsp.plan.space.mission_solver import solve_mission
+    from netsp.roadmap.outline import build_outline
+    from netsp.roadmap.roadmap_policy import SightPolicy
+    from netsp.roadmap.tangents import tangent_rows
     from netsp.roadmap.travel_graph import TravelGraph
     from netsp.world import ReactTether, Scene
     from netsp.world.mission.equipment import TetherPhysics
@@ -152,6 +156,7 @@ def steps() -> Iterator[Step]:
     from netsp.world.scene import voxels
     from netsp.world.scene.field import DistanceField
     from netsp.world.simulator.mission_run import simulate
+    from netsp.world.simulator.surprises import SceneSurprises
 
     problem = random_world(1, goals=9, tether_length=450.0)
     polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)
@@ -218,6 +223,13 @@ def steps() -> Iterator[Step]:
     yield "matrices of costs", compile_cost_matrices
     yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
 
+    def compile_horizons() -> None:
+        outline = build_outline(polygons)
+        policy = SightPolicy(min_pairs=0)
+        tangent_rows(outline, outline.arcs, outline.full, np.inf, policy=policy)
+
+    yield "thousands of corners", compile_horizons
+
     def compile_sampled_roadmap() -> None:
         # OMPL is an extra, and so few samples may miss a goal
         with contextlib.suppress(InputError, LimitReachedError):
@@ -262,6 +274,35 @@ def steps() -> Iterator[Step]:
             scene=scene,
             time_limit=None,
         ),
+    )
+
+    # a ring has a loop, and the box has edges that a leg goes around
+    loop = {"torus": {"center": (0, 0, 0), "axis": (1, 0, 0), "major_radius": 0.8,
+                      "minor_radius": 0.1}}  # fmt: skip
+    box = {"box": {"center": (2.2, 0, 0), "size": (0.6, 1.6, 1.6)}}
+    loops = Scene.model_validate({"solids": [loop, box], "bounds": [-4, -4, -4, 4, 4, 4]})
+    around_loops = Mission.model_validate(
+        {
+            "scene": "-",
+            "anchor": (-2.5, 0.3, 0.2),
+            "start": (-2.5, 0.3, 0.2),
+            "tether_length": 11.0,
+            "waypoints": [(3.2, 0.1, 0.0), (0.3, 0.9, 0.6)],
+            "clearance": 0.25,
+            "cell": 0.3,
+            "range_sensor": {},
+        }
+    )
+    few_cells = MissionPolicy(potential=PotentialPolicy(max_cells=15_000))
+    yield (
+        "bounds in space",
+        partial(solve_mission, around_loops, scene=loops, time_limit=None, policy=few_cells),
+    )
+    appears = {"time": 0, "appear": {"sphere": {"center": (1.5, 0, 0), "radius": 0.2}}}
+    surprises = SceneSurprises.model_validate({"schema_version": 1, "events": [appears]})
+    yield (
+        "missions, range sensor",
+        partial(simulate, around_loops, scene=loops, surprises=surprises),
     )
 
     few_rounds = CoverPolicy(max_candidates=300, tours=TourSearchPolicy(max_rounds=20))
