@@ -132,7 +132,7 @@ def cable_lengths(flight: dict[str, Any], friction: float) -> tuple[list[float],
     for k, place in enumerate(places):
         cable.go(place)
         cable.stay(params.settle_s if k in stops else params.pause_s)
-        lengths.append(round(cable_length(field, cable.nodes()), 4))
+        lengths.append(round(cable_length(field, cable.nodes(), params.max_depth), 4))
     return lengths, time.process_time() - begin
 
 

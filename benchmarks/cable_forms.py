@@ -31,7 +31,7 @@ def settled(scene: Scene, path: list[Any], friction: float) -> float:
     for place in path:
         cable.go(place)
     cable.stay(2.0 * params.settle_s)
-    return cable_length(scene.field(), cable.nodes())
+    return cable_length(scene.field(), cable.nodes(), params.max_depth)
 
 
 def round_post(friction: float) -> tuple[float, float]:
@@ -69,7 +69,7 @@ def slip_off_bar(_: float) -> tuple[float, float]:
         cable.go((x, 1.5, -1.0))
         cable.stay(params.pause_s)
         straight = float(np.linalg.norm(np.array((x, 1.5, -1.0)) - anchor))
-        if cable_length(field, cable.nodes()) < 1.05 * straight:
+        if cable_length(field, cable.nodes(), params.max_depth) < 1.05 * straight:
             return 0.3, float(x)
     return 0.3, math.inf
 

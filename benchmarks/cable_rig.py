@@ -3,8 +3,10 @@
 A cable is a flexible body of one dimension. Its links are round rods, so edges of solids touch it
 anywhere along a link; with balls only, edges would catch between them, as if there were friction.
 Limited tendons keep the links from stretching. Solids are thinner by the radius of the links, so
-that the middle of the cable runs where the taut tether of the same scene does. `cable_forms.py`
-measures the error of such cables against closed forms. MuJoCo comes with
+that the middle of the cable runs where the taut tether of the same scene does. Solids that touch
+would part by that, and the cable would slip in between, so boxes fill their seams
+(`netsp.world.scene.seams`). A cable that is inside a solid all the same ends the simulation.
+`cable_forms.py` measures the error of such cables against closed forms. MuJoCo comes with
 `pip install 'netsp[bench]'`.
 """
 
@@ -19,6 +21,7 @@ import numpy as np
 
 from netsp.world import Scene
 from netsp.world.scene.field import DistanceField
+from netsp.world.scene.seams import seam_boxes
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,9 @@ class CableParams:
         Time at each stop before lengths are measured, s.
     pause_s
         Time at each place on a leg before lengths are measured, s: the cable follows the robot.
+    max_depth
+        Maximum depth of the middle of a link in a solid of the scene, metres. Where links bend
+        around a right angle, it is up to 0.05.
     """
 
     spacing: float = 0.08
@@ -74,6 +80,7 @@ class CableParams:
     friction_stiffness: float = 10.0
     settle_s: float = 1.0
     pause_s: float = 0.4
+    max_depth: float = 0.1
 
 
 def _contact(friction: float, contact_s: float, kinds: str) -> str:
@@ -116,6 +123,11 @@ def geoms(scene: Scene, params: CableParams, friction: float, pieces: int = 48) 
             made += [capsule(a, b, s["minor_radius"]) for a, b in itertools.pairwise(ring)]
         else:
             raise ValueError(f"solid {kind}: expected a capsule, box or torus")
+    for _, seam in seam_boxes([s.shape for s in scene.solids]):
+        centre, half, axes = seam[:3], np.array(seam[3:6]) - radius, seam[6:12]
+        if half.min() > 0.0:  # the cable does not fit into narrower seams
+            place, size, turned = (" ".join(f"{v:.9g}" for v in w) for w in (centre, half, axes))
+            made.append(f'<geom type="box" pos="{place}" size="{size}" xyaxes="{turned}" {rub}/>')
     return made
 
 
@@ -257,10 +269,22 @@ class Cable:
                 return
 
 
-def cable_length(field: DistanceField, nodes: np.ndarray) -> float:
-    """Return the length of a cable (n, 3) over the surfaces that its chords cut, metres."""
+def cable_length(field: DistanceField, nodes: np.ndarray, max_depth: float) -> float:
+    """Return the length of a cable (n, 3) over the surfaces that its chords cut, metres.
+
+    Raises
+    ------
+    ArithmeticError
+        If a link is deeper in a solid than `max_depth`, metres: the cable has gone through it.
+    """
     steps = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
-    depth = np.maximum(-field.distance(0.5 * (nodes[1:] + nodes[:-1])), 0.0)
+    middles = 0.5 * (nodes[1:] + nodes[:-1])
+    depth = np.maximum(-field.distance(middles), 0.0)
+    if depth.max(initial=0.0) > max_depth:
+        k = int(depth.argmax())
+        raise ArithmeticError(
+            f"the cable is {depth[k]:.2f} m inside a solid at {middles[k].round(2).tolist()}"
+        )
     half = 2.0 * np.arctan(2.0 * depth / np.maximum(steps, 1e-9))
     bent = np.where(half > 1e-6, half / np.sin(np.maximum(half, 1e-9)), 1.0)
     return float((steps * bent).sum())

@@ -429,6 +429,47 @@ def _slide_groups(rows, corners, nodes, count, cut, slack, gap, reach):
 
 
 @numba.njit(cache=True)
+def _over_corners(rows, corners, nodes, count, cut, slack, reach):
+    """Take the string over the corners of boxes that it lies around, if this shortens it and sweeps
+    free water only; return the number of its nodes.
+
+    Near a corner the string may lie across three faces. No single node can slide off there: only
+    all of them together, past the corner. The nodes nearer to the corner than `reach` go to it.
+    """
+    for n in range(len(rows)):
+        if int(rows[n, 0]) != BOX:
+            continue
+        for corner in range(8):
+            tip = rows[n, 1:4].copy()
+            for k in range(3):
+                half = rows[n, 4 + k] + 1e-3
+                tip += (half if corner >> k & 1 else -half) * rows[n, 7 + 3 * k : 10 + 3 * k]
+            begin = 1
+            while begin < count - 1 and _distance(nodes[begin], tip) > reach:
+                begin += 1
+            end = begin
+            while end < count - 1 and _distance(nodes[end], tip) <= reach:
+                end += 1
+            if end - begin < 2:
+                continue
+            before, after = nodes[begin - 1].copy(), nodes[end].copy()
+            length = _distance(before, tip) + _distance(tip, after)
+            free = (
+                length < _length(nodes[begin - 1 :], end - begin + 2) - 1e-4
+                and _room(rows, corners, tip[0], tip[1], tip[2]) >= 0.0
+                and is_free(rows, corners, before, tip, 0.5 * (before + tip), cut)
+                and is_free(rows, corners, tip, after, 0.5 * (tip + after), cut)
+            )
+            for k in range(begin - 1, end):
+                free = free and is_free(rows, corners, nodes[k], nodes[k + 1], tip, slack)
+            if free:
+                nodes[begin] = tip
+                nodes[begin + 1 : count - end + begin + 1] = nodes[end:count].copy()
+                count -= end - begin - 1
+    return count
+
+
+@numba.njit(cache=True)
 def _near(rows, corners, nodes, count, room):
     """Return the solids that are nearer than `room` to a node."""
     near = np.zeros(len(rows), dtype=np.bool_)
@@ -479,8 +520,14 @@ def _relaxed(
             dense[:many] = dense[:many][::-1].copy()
         nodes[:many], count = dense[:many], many
         before, length = length, _length(nodes, count)
-        if before - length < least:
+        if before - length >= least:
+            continue
+        # a string that still moves would skip the corner that it comes to rest around
+        for near_tip in (slide, 3.0 * fine):
+            count = _over_corners(rows, corners, nodes, count, cut, slack, near_tip)
+        if length - _length(nodes, count) < least:
             break
+        length = _length(nodes, count)
     return count
 
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.optimize
 import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
+from netsp.base.geometry import polylines
 from netsp.hsignature import signature
 from netsp.plan.random_worlds import random_world
 from netsp.roadmap.paths import TautPaths
@@ -405,3 +407,29 @@ def test_a_tether_does_not_hang_on_the_tips_of_corners(seed):
             tether = tethers.update(tether, tether.robot)
         above.append(tether.length / finer.refine(tether).length - 1.0)
     assert max(above) < 0.005
+
+
+def test_a_tether_slips_off_the_corner_of_a_box_when_no_shortest_line_lies_around_it():
+    """Around two edges that meet in a corner, the line is shortest at the corner itself from there
+    on; contacts on the two edges must not block each other."""
+    below, stern, side = -2.0, -8.0, 2.0
+    anchor = np.array((-6.5, -0.3, -2.4))
+
+    def length(v, robot):
+        line = np.array([anchor, (stern, v[0], below), (stern, side, v[1]), robot])
+        return np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+
+    solids = [{"box": {"center": [0, 0, -1], "size": [16, 4, 2]}}]
+    model = GeodesicTether(Scene(solids=solids).field(), 0.05)
+    corners = np.array([(-7.7, 2.5, -1.4), (-6.9, 2.9, -1.2), (-5, 2.9, -1.2)])
+    path = polylines.dense(corners, 0.05)
+    tether = model.lay([anchor, (-8.3, 1.7, -2.1), (-8.3, 2.2, -1.7), path[0]])
+    lengths = model.drive(tether, path)[1]
+    bounds = [(-side, side), (below, 0.0)]
+    best = [scipy.optimize.minimize(length, (1.7, -1.8), (p,), bounds=bounds) for p in path]
+    at_corner = [max(side - b.x[0], b.x[1] - below) < 1e-3 for b in best]
+    last = at_corner.index(True)
+    assert 3 < last < len(path) - 20
+    assert lengths[:last] == pytest.approx([b.fun for b in best[:last]], abs=2e-3)
+    # it lags by no more than half a metre of the robot's path
+    assert (lengths[last + 10 :] < [b.fun - 0.1 for b in best[last + 10 :]]).all()

@@ -30,7 +30,7 @@ from netsp.world.tether.strand import (
     strand_length,
     to_surface,
 )
-from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 
 
 @kernel
@@ -51,7 +51,7 @@ def creep(
     count : int
         Number of its nodes.
     """
-    stride, slip = STRIDE * settings.delta, SLIP * settings.delta
+    stride, slip = settings.stride, settings.slip
     if travel <= settings.precision or settings.hold_friction <= 0.0 or count < 3:
         return strand, count
     pieces = min(math.ceil(travel / stride), settings.max_creep_pieces)
@@ -73,7 +73,7 @@ def creep_once(
 
     This is a step of the implicit Euler method. Returns the largest motion, metres.
     """
-    n, stride = count - 2, STRIDE * settings.delta
+    n, stride = count - 2, settings.stride
     slope, diagonal, beside, pressing, _ = length_derivatives(strand, count, settings)
     for k in range(n):
         diagonal[k] += settings.hold_friction * max(pressing[k], 0.0) / travel

@@ -23,7 +23,7 @@ from netsp.world.scene.sampling import Field
 from netsp.world.tether.mend import mend
 from netsp.world.tether.pull import pull
 from netsp.world.tether.strand import WIDTH, strand_length
-from netsp.world.tether.tether_policy import SLIP, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 
 
 @kernel
@@ -34,7 +34,7 @@ def corner_excess(field: Field, strand: Floats, count: int, settings: PullSettin
     """
     if field.data[VOXELS] <= 0.0:
         return 0.0
-    deep = settings.corner_depth * (SLIP * settings.delta)
+    deep = settings.corner_depth * settings.slip
     length, shortest = strand_length(strand, count), math.inf
     room = 4 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count

@@ -6,7 +6,7 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.kernel import kernel
 from netsp.world.scene.sampling import Field
 from netsp.world.tether.strand import USED, X, Y, Z, exit_point, insert_node, probe_edge
-from netsp.world.tether.tether_policy import SLIP, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 
 
 @kernel
@@ -23,7 +23,7 @@ def mend(
     deep : float
         Depth at which an edge is too deep, metres. If it is below a slip, all edges are probed.
     """
-    slip = SLIP * settings.delta
+    slip = settings.slip
     i, budget = 0, min(64 + 2 * count, room - count)
     while i < count - 1:
         if strand[i, USED] > 1.0 or deep < slip:

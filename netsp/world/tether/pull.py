@@ -49,7 +49,7 @@ from netsp.world.tether.strand import (
     to_surface,
     update_frame,
 )
-from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 from netsp.world.tether.tips import sidestep_tips
 
 
@@ -76,7 +76,7 @@ def pull_end(
         Motion in the last round, metres.
     """
     delta = settings.delta
-    stride, slip = STRIDE * delta, SLIP * delta
+    stride, slip = settings.stride, settings.slip
     end = count - 1 if last else 0
     left = 2.0
     residual = 0.0
@@ -145,7 +145,7 @@ def pull(
         Maximum number of sidesteps off the tips of corners.
     """
     delta, precision = settings.delta, settings.precision
-    slip, stride = SLIP * delta, STRIDE * delta
+    slip, stride = settings.slip, settings.stride
     min_gain = settings.min_gain * precision
     residual, damping, gain = 0.0, 1.0, 1.0
     room = count + 64 + int(0.5 * strand_length(strand, count) / slip)
@@ -185,8 +185,10 @@ def pull(
             # sidesteps again only if the last ones have shortened the strand
             last_length, length = length, strand_length(strand, count)
             came_off = False
-            if settings.hold_friction == 0.0 and length < last_length - min_gain:
-                strand, count, came_off = sidestep_tips(field, strand, count, settings, room, steps)
+            if length < last_length - min_gain:
+                strand, count, came_off = sidestep_tips(
+                    field, strand, count, settings, room, steps, is_still
+                )
             if came_off:
                 rounds, vain_rounds = max(rounds, done + 2), 0
                 continue
@@ -231,7 +233,7 @@ def drop_free_nodes(
     A node that cannot move freely to the line between its neighbours is brought nearer to it.
     Returns the number of nodes and the largest motion.
     """
-    slip, stride = SLIP * settings.delta, STRIDE * settings.delta
+    slip, stride = settings.slip, settings.stride
     lifted = 0.0
     i = 1
     while i < count - 1:
@@ -306,7 +308,7 @@ def free_part(
     field: Field, strand: Floats, i: int, hx: float, hy: float, hz: float, settings: PullSettings
 ) -> float:
     """Return the part of a motion (hx, hy, hz) of node i that sweeps free water or is a stride."""
-    slip, stride = SLIP * settings.delta, STRIDE * settings.delta
+    slip, stride = settings.slip, settings.stride
     px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
     ax, ay, az = strand[i - 1, X], strand[i - 1, Y], strand[i - 1, Z]
     bx, by, bz = strand[i + 1, X], strand[i + 1, Y], strand[i + 1, Z]
@@ -330,7 +332,7 @@ def slide_contacts(
     `gain` is the factor on the step before. Returns the largest distance still to go, and the
     factor.
     """
-    stride, precision = STRIDE * settings.delta, settings.precision
+    stride, precision = settings.stride, settings.precision
     n = count - 2
     if n < 1:
         return 0.0, 1.0

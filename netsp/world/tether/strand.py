@@ -14,7 +14,7 @@ from netsp.base.arrays import Floats
 from netsp.base.compiled.dynamic_array import write_rows
 from netsp.base.compiled.kernel import kernel
 from netsp.world.scene.sampling import Field, distance, lowest_along, sample
-from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 
 Vector = tuple[float, float, float]
 
@@ -332,7 +332,7 @@ def exit_point(
 
     That is on the sharp edge of the solid that the strand cuts off, else straight out.
     """
-    slip = SLIP * settings.delta
+    slip = settings.slip
     ux = strand[i + 1, X] - strand[i, X]
     uy = strand[i + 1, Y] - strand[i, Y]
     uz = strand[i + 1, Z] - strand[i, Z]
@@ -366,7 +366,7 @@ def update_frame(field: Field, strand: Floats, i: int, settings: PullSettings) -
 
     Returns how far the node was moved.
     """
-    spread, reach = settings.spread, STRIDE * settings.delta
+    spread, reach = settings.spread, settings.stride
     px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
     ux, uy, uz = px - strand[i - 1, X], py - strand[i - 1, Y], pz - strand[i - 1, Z]
     wx, wy, wz = strand[i + 1, X] - px, strand[i + 1, Y] - py, strand[i + 1, Z] - pz

@@ -153,6 +153,10 @@ class PullSettings(NamedTuple):
     ----------
     delta
         Resolution, metres.
+    slip
+        Maximum depth of an edge inside a solid, metres: `SLIP` times delta.
+    stride
+        Maximum length of a motion whose path is not checked, metres: `STRIDE` times delta.
     spread
         Distance from a contact at which the normals before and after it are sampled, metres.
     flat
@@ -164,6 +168,8 @@ class PullSettings(NamedTuple):
     """
 
     delta: float
+    slip: float
+    stride: float
     spread: float
     flat: float
     rounds: int
@@ -203,4 +209,5 @@ def pull_settings(
     policy: TetherPolicy, *, delta: float, spread: float, flat: float, rounds: int, precision: float
 ) -> PullSettings:
     """Return the settings of a model with a policy, as kernels take them."""
-    return PullSettings(delta, spread, flat, rounds, precision, **asdict(policy))
+    slip, stride = SLIP * delta, STRIDE * delta
+    return PullSettings(delta, slip, stride, spread, flat, rounds, precision, **asdict(policy))

@@ -26,25 +26,40 @@ from netsp.world.tether.strand import (
     strand_length,
     to_surface,
 )
-from netsp.world.tether.tether_policy import SLIP, STRIDE, PullSettings
+from netsp.world.tether.tether_policy import PullSettings
 
 
 @kernel
 def sidestep_tips(
-    field: Field, strand: Floats, count: int, settings: PullSettings, room: int, steps: int
+    field: Field,
+    strand: Floats,
+    count: int,
+    settings: PullSettings,
+    room: int,
+    steps: int,
+    is_still: bool,
 ) -> tuple[Floats, int, bool]:
     """Move contacts sideways where the strand turns sharply, if that makes it shorter.
 
     Over the tip of a corner each contact by itself is held, and a strand that is taut on both sides
     of the tip lies on a saddle: only all contacts together, moved across the strand, leave it.
     Edges of voxels are uneven, and a strand would stay in their notches, which are millimetres
-    deep.
+    deep. Of exact solids, only the corners where edges meet need sidesteps: there, contacts on two
+    edges block each other, and a strand that should slip off does not come to rest.
 
     Returns the strand, the number of its nodes, and whether any contact was moved.
+
+    Parameters
+    ----------
+    is_still : bool
+        Whether the strand is at rest.
     """
-    stride, slip = STRIDE * settings.delta, SLIP * settings.delta
+    stride, slip = settings.stride, settings.slip
     min_gain = settings.min_gain * settings.precision
-    i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need no sidesteps
+    is_exact = field.data[VOXELS] == 0.0
+    i = 1
+    if is_still if is_exact else settings.hold_friction > 0.0:
+        return strand, count, False
     while i < count - 1:
         j = i
         while j + 1 < count - 1 and gap(strand, j, j + 1) <= settings.tip_strides * stride:
@@ -56,7 +71,9 @@ def sidestep_tips(
             is_uneven = strand[k, PART] < 0.0 and steps > 1
             is_edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
             is_sharp = is_sharp or is_uneven or is_edge or not is_resting(strand, k)
-        if is_turning and is_sharp and j < i + settings.max_tip_contacts:
+        is_corner = i < j and strand[i, SHARP] + strand[j, SHARP] == 2.0
+        is_tip = is_turning and (is_corner if is_exact else is_sharp)
+        if is_tip and j < i + settings.max_tip_contacts:
             before, kept = strand_length(strand, count), strand[:count].copy()
             # a strand that crosses an edge at a slant slips along the edge
             along_edge = i == j and strand[i, SHARP] == 1.0
@@ -100,7 +117,7 @@ def sidestep(
     Returns False where a node moved farther than a stride, after which the homotopy class may
     differ; then the step must not be used.
     """
-    stride = STRIDE * settings.delta
+    stride = settings.stride
     step = settings.sidestep_strides * stride
     vx, vy, vz = direction
     for k in range(i, j + 1):
