@@ -124,10 +124,12 @@ def geoms(scene: Scene, params: CableParams, friction: float, pieces: int = 48) 
         else:
             raise ValueError(f"solid {kind}: expected a capsule, box or torus")
     for _, seam in seam_boxes([s.shape for s in scene.solids]):
-        centre, half, axes = seam[:3], np.array(seam[3:6]) - radius, seam[6:12]
-        if half.min() > 0.0:  # the cable does not fit into narrower seams
-            place, size, turned = (" ".join(f"{v:.9g}" for v in w) for w in (centre, half, axes))
-            made.append(f'<geom type="box" pos="{place}" size="{size}" xyaxes="{turned}" {rub}/>')
+        halves = np.array(seam[3:6]) - radius
+        if halves.min() > 0.0:  # the cable does not fit into narrower seams
+            texts = [" ".join(f"{v:.9g}" for v in w) for w in (seam[:3], halves, seam[6:12])]
+            made.append(
+                f'<geom type="box" pos="{texts[0]}" size="{texts[1]}" xyaxes="{texts[2]}" {rub}/>'
+            )
     return made
 
 
