@@ -7,7 +7,7 @@ import pytest
 
 from netsp import Problem, solve
 from netsp.base.clock import Clock
-from netsp.plan.space.few_obstacles import obstacles_in_the_way, solve_with_few_obstacles
+from netsp.plan.space.few_obstacles import blocking_obstacles, solve_with_few_obstacles
 
 
 def random_problem(seed: int) -> Problem:
@@ -41,14 +41,14 @@ def test_a_tour_around_two_posts_is_bounded_by_the_detour_that_the_deeper_one_co
     problem = Problem(base=(0, 0), goals=corners, obstacles=posts, tether_length=9.0)
     found = list(solve_with_few_obstacles(problem, Clock(20.0), max_added=1))
     assert found[0].bound == pytest.approx(12.0)
-    assert found[0].in_the_way == (0, 1)
+    assert found[0].blocking == (0, 1)
     assert found[1].bound > 12.0 + 1e-6
     assert found[-1].bound == pytest.approx(solve(problem).length)
 
 
-def test_where_no_post_entangles_a_path_those_that_it_crosses_are_in_the_way():
+def test_where_no_post_entangles_a_path_those_that_it_crosses_are_given():
     posts = [{"center": (x, y), "radius": 0.5} for x, y in ((2, 0.2), (5, 0.1), (5, 3))]
     problem = Problem(base=(0, 0), goals=[(8, 0)], obstacles=posts, tether_length=20.0)
     there_and_back = np.array([(0, 0), (8, 0), (0, 0)])
-    assert obstacles_in_the_way(problem, set(), there_and_back) == (1, 0)
-    assert obstacles_in_the_way(problem, {0, 1}, there_and_back) == ()
+    assert blocking_obstacles(problem, set(), there_and_back) == (1, 0)
+    assert blocking_obstacles(problem, {0, 1}, there_and_back) == ()

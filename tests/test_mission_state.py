@@ -145,7 +145,7 @@ def test_an_alternative_in_a_solid_is_told(planned):
 def test_alternatives_of_a_cover_see_as_much_in_any_combination():
     scene = Scene(solids=[{"box": {"center": [0, 0, 0], "size": [2, 1, 1]}}])
     found = cover(
-        scene, anchor=(4, 0, 2), camera=Camera(range=2.5, patch=0.4), standoff=1.2, time_limit=None
+        scene, anchor=(4, 0, 2), camera=Camera(range=2.5, patch=0.25), standoff=1.2, time_limit=None
     )
     assert sum(len(w.alternatives) for w in found.mission.waypoints) >= 3
     rng = np.random.default_rng(0)

@@ -277,8 +277,8 @@ def steps() -> Iterator[Step]:
     )
 
     # a ring has a loop, and the box has edges that a leg goes around
-    loop = {"torus": {"center": (0, 0, 0), "axis": (1, 0, 0), "major_radius": 0.8,
-                      "minor_radius": 0.1}}  # fmt: skip
+    torus = {"center": (0, 0, 0), "axis": (1, 0, 0), "major_radius": 0.8, "minor_radius": 0.1}
+    loop = {"torus": torus}
     box = {"box": {"center": (2.2, 0, 0), "size": (0.6, 1.6, 1.6)}}
     loops = Scene.model_validate({"solids": [loop, box], "bounds": [-4, -4, -4, 4, 4, 4]})
     around_loops = Mission.model_validate(

@@ -3,8 +3,7 @@
 A problem with fewer obstacles has no longer tours, and far fewer classes, so it is soon solved. Its
 shortest tour is usually entangled with some of the obstacles that were left out. Those are added,
 the deepest inside the tour first, because tours that are not entangled with them have the longest
-detours. Then the problem is solved again, and so on, until no obstacle is in the way of the
-shortest tour.
+detours. Then the problem is solved again, and so on, until no obstacle blocks the shortest tour.
 """
 
 from __future__ import annotations
@@ -37,21 +36,21 @@ class FewObstacles:
         Lower bound on its tours, and so on those of the whole problem.
     is_solved
         Whether its shortest tour is proven.
-    in_the_way
-        Indices of the obstacles left out that are in the way of its shortest tour, the deepest
-        inside it first.
+    blocking
+        Indices of the obstacles left out that block its shortest tour, the deepest inside it
+        first.
     """
 
     problem: Problem
     bound: float
     is_solved: bool
-    in_the_way: tuple[int, ...]
+    blocking: tuple[int, ...]
 
 
 def solve_with_few_obstacles(
     problem: Problem, clock: Clock, max_added: int
 ) -> Iterator[FewObstacles]:
-    """Yield problems with more and more obstacles of a problem, each solved, whose bounds rise.
+    """Yield problems with ever more obstacles of a problem, whose bounds rise.
 
     Parameters
     ----------
@@ -65,41 +64,41 @@ def solve_with_few_obstacles(
     Yields
     ------
     FewObstacles
-        Those that are solved with proof, and at last one that may not be. Nothing after the first
-        whose tour no obstacle is in the way of.
+        Problems that are solved with proof, and at last one that may not be. None follows a tour
+        that no obstacle blocks.
     """
     kept: set[int] = set()
     while not clock.is_up:
-        few = problem.model_copy(
+        reduced = problem.model_copy(
             update={"obstacles": tuple(problem.obstacles[n] for n in sorted(kept))}
         )
         try:
-            solution = solve(few, time_limit=clock)
+            solution = solve(reduced, time_limit=clock)
         except NetspError:
             return
         bound = solution.bound
         if bound is None or bound.scope is not Scope.ALL_TOURS:
             return
-        blocking = obstacles_in_the_way(problem, kept, np.array(solution.path))
+        blocking = blocking_obstacles(problem, kept, np.array(solution.path))
         is_solved = solution.status is Status.OPTIMAL
-        yield FewObstacles(few, bound.length, is_solved, blocking)
+        yield FewObstacles(reduced, bound.length, is_solved, blocking)
         if not blocking or not is_solved:
             return
         kept.update(blocking[:max_added])
 
 
-def obstacles_in_the_way(problem: Problem, kept: Set[int], path: Floats) -> tuple[int, ...]:
-    """Return the indices of obstacles of a problem, besides some that are kept, with which a closed
-    path (k, 2) or (k, 3) is entangled, the deepest inside it first.
+def blocking_obstacles(problem: Problem, kept: Set[int], path: Floats) -> tuple[int, ...]:
+    """Return the indices of a problem's obstacles with which a closed path (k, 2) or (k, 3) is
+    entangled, besides those in `kept`, the deepest inside it first.
 
-    If there are none, return those that the path crosses, the longest crossing first. Obstacles
-    with which only several together entangle the path are not looked for.
+    If there are none, return the obstacles that the path crosses, the longest crossing first.
+    Obstacles with which only several together entangle the path are not looked for.
 
     Examples
     --------
     >>> posts = [{"center": (x, 1.0), "radius": 0.2} for x in (1.0, 5.0)]
     >>> problem = Problem(base=(0, 0), goals=[(2, 2)], obstacles=posts, tether_length=9.0)
-    >>> obstacles_in_the_way(problem, set(), np.array([(0, 0), (2, 0), (2, 2), (0, 2), (0, 0)]))
+    >>> blocking_obstacles(problem, set(), np.array([(0, 0), (2, 0), (2, 2), (0, 2), (0, 0)]))
     (0,)
     """
     import shapely

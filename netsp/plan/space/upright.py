@@ -95,9 +95,9 @@ def _bound_in_plane(
             return bounds[-1]
     solved: FewObstacles | None = None
     few_clock = clock.part(policy.few_share)
-    for few in solve_with_few_obstacles(problem, few_clock, policy.max_obstacles_added):
-        bounds.append(few.bound)
-        solved = few if few.is_solved else solved
+    for reduced in solve_with_few_obstacles(problem, few_clock, policy.max_obstacles_added):
+        bounds.append(reduced.bound)
+        solved = reduced if reduced.is_solved else solved
     if solved is not None and not clock.is_up:
         roadmap = TautRoadmap(solved.problem, max_classes=policy.max_classes, time_limit=clock)
         if roadmap.complete:
