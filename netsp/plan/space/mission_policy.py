@@ -292,7 +292,7 @@ class BoundPolicy:
     upright_share: float = 0.4
     max_classes: int = 4000
     thick_share: float = 0.2
-    few_share: float = 0.7
+    few_share: float = 0.85
     max_obstacles_added: int = 2
     max_detour_ratio: float = 2.2
     max_leg_gap: float = 2e-3
