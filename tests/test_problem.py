@@ -121,7 +121,15 @@ def test_bad_input_is_named_in_one_line(case):
     ("text", "expected"),
     [
         ("{", "f: not JSON: Expecting property name"),
-        ("", "f: not JSON: Expecting value at line 1, column 1"),
+        ("", "f: not JSON: Expecting value at line 1, column 1; the text ends too early"),
+        (
+            '{"base": [0, 0], "goals',
+            "f: not JSON: Unterminated string starting at line 1, column 18; the text ends",
+        ),
+        (
+            '{"base": [0, 0]',
+            "f: not JSON: Expecting ',' delimiter at line 1, column 16; the text ends",
+        ),
         ('{"base": [0, 0], "base": [1, 1]}', "f: field 'base' is given twice"),
         ("[" * 100_000, "f: not JSON"),
         ('{"base": [' + "9" * 5000 + "]}", "f: not JSON that netsp reads: a number has too many"),

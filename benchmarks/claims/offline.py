@@ -223,7 +223,9 @@ def published_program() -> tuple[str, bool]:
 def proven_within(goals: int, tether: float, limit: float) -> tuple[str, bool]:
     """Whether the first world of a cell is proven within a limit."""
     import frontier
+    from machine_speed import slowness
 
+    limit *= slowness()
     outcome = frontier.proof(frontier.world(0, goals, tether, many=False), limit)
     return f"{outcome.gap:.2f} % after {outcome.seconds:.0f} s", outcome.verified and outcome.proven
 
@@ -232,11 +234,12 @@ def merged() -> tuple[str, bool]:
     """The tour of the fourth world of 200 goals at tether 300 after a minute; a search alone ends
     in 4793.18 m at best."""
     import frontier
+    from machine_speed import slowness
 
     from netsp import solve, verify
 
     problem = frontier.world(3, 200, 300.0, many=False)
-    found = solve(problem, time_limit=60.0)
+    found = solve(problem, time_limit=60.0 * slowness())
     length = found.length or np.inf
     return f"{length:.2f} m", bool(verify(problem, found)) and length < 4792.0
 
@@ -342,10 +345,12 @@ def certified() -> tuple[str, bool]:
 
 def many_classes() -> tuple[str, bool]:
     """Gap in per cent of a wind farm of 25 turbines after 20 s."""
+    from machine_speed import slowness
+
     from netsp import Problem, solve, verify
 
     problem = Problem.load(ROOT / "problems" / "library" / "windfarm-25-0.json")
-    found = solve(problem, time_limit=20.0)
+    found = solve(problem, time_limit=20.0 * slowness())
     gap = 100.0 * (found.gap if found.gap is not None else 1.0)
     return f"{gap:.2f} %", bool(verify(problem, found)) and gap <= 5.0
 

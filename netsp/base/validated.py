@@ -158,8 +158,10 @@ def parse_json(text: str | bytes, source: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
-        known = "NODE_COORD_SECTION" in str(text) or "GTSP_SET_SECTION" in str(text)
-        hint = "; `netsp gtsp` reads this format" if known else ""
+        known = "NODE_COORD_SECTION" in error.doc or "GTSP_SET_SECTION" in error.doc
+        is_cut_off = error.msg.startswith("Unterminated") or not error.doc[error.pos :].strip()
+        hint = "; the text ends too early: is the file complete?" if is_cut_off else ""
+        hint = "; `netsp gtsp` reads this format" if known else hint
         raise InputError(
             f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}{hint}"
         ) from None

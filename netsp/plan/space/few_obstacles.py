@@ -25,7 +25,7 @@ from netsp.plan.solve_problem import solve
 
 
 @dataclass(frozen=True)
-class FewObstacles:
+class ReducedProblem:
     """Problem with few of the obstacles of another, and the length of its shortest tour.
 
     Attributes
@@ -35,7 +35,7 @@ class FewObstacles:
     bound
         Lower bound on its tours, and so on those of the whole problem.
     is_solved
-        Whether its shortest tour is proven.
+        Whether its shortest tour is proven shortest.
     blocking
         Indices of the obstacles left out that block its shortest tour, the deepest inside it
         first.
@@ -49,7 +49,7 @@ class FewObstacles:
 
 def solve_with_few_obstacles(
     problem: Problem, clock: Clock, max_added: int
-) -> Iterator[FewObstacles]:
+) -> Iterator[ReducedProblem]:
     """Yield problems with ever more obstacles of a problem, whose bounds rise.
 
     Parameters
@@ -63,7 +63,7 @@ def solve_with_few_obstacles(
 
     Yields
     ------
-    FewObstacles
+    ReducedProblem
         Problems that are solved with proof, and at last one that may not be. None follows a tour
         that no obstacle blocks.
     """
@@ -81,7 +81,7 @@ def solve_with_few_obstacles(
             return
         blocking = blocking_obstacles(problem, kept, np.array(solution.path))
         is_solved = solution.status is Status.OPTIMAL
-        yield FewObstacles(reduced, bound.length, is_solved, blocking)
+        yield ReducedProblem(reduced, bound.length, is_solved, blocking)
         if not blocking or not is_solved:
             return
         kept.update(blocking[:max_added])

@@ -21,7 +21,7 @@ from netsp.model.problem import Circle, Polygon, Problem
 from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
-from netsp.plan.space.few_obstacles import FewObstacles, solve_with_few_obstacles
+from netsp.plan.space.few_obstacles import ReducedProblem, solve_with_few_obstacles
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, PlanningContext
 from netsp.plan.space.potential import BOUND_ROUNDING
@@ -93,7 +93,7 @@ def _bound_in_plane(
         bounds.append(_bound_with_room(roadmap, context, dip, limit) or 0.0)
         if is_whole and bounds[-1]:
             return bounds[-1]
-    solved: FewObstacles | None = None
+    solved: ReducedProblem | None = None
     few_clock = clock.part(policy.few_share)
     for reduced in solve_with_few_obstacles(problem, few_clock, policy.max_obstacles_added):
         bounds.append(reduced.bound)

@@ -210,17 +210,20 @@ def first_hits(tree: Tree, rays: Floats) -> Floats:
     """Return the length (n,) of rays (n, 6) from start and direction up to the first face."""
     out = np.empty(len(rays))
     for i in range(len(rays)):
-        out[i] = _first_hit(tree, rays, i)
+        out[i] = _hit_within(tree, rays, i, math.inf, False)
     return out
 
 
 @kernel
-def _first_hit(tree: Tree, rays: Floats, i: int) -> float:
-    """Return the length of ray i up to the first face; infinite without one."""
+def _hit_within(tree: Tree, rays: Floats, i: int, far: float, any_face: bool) -> float:
+    """Return the length of ray i up to the first face nearer than `far`; `far` without one.
+
+    With `any_face`, the face need not be the first one.
+    """
     triangles, nodes, boxes, _ = tree
     waiting = np.empty(128, dtype=np.int64)
     waiting[0] = 0
-    left, best = 1, math.inf
+    left, best = 1, far
     while left > 0:
         left -= 1
         n = waiting[left]
@@ -232,6 +235,8 @@ def _first_hit(tree: Tree, rays: Floats, i: int) -> float:
             continue
         for s in range(nodes[n, BEGIN], nodes[n, END]):
             best = min(best, _face_hit(triangles, s, rays, i))
+        if any_face and best < far:
+            break
     return float(best)
 
 
@@ -243,30 +248,8 @@ def are_blocked(tree: Tree, eye: Floats, places: Floats) -> Bools:
     rays[0, :3] = eye
     for i in range(len(places)):
         rays[0, 3:] = places[i] - eye
-        out[i] = _is_blocked(tree, rays)
+        out[i] = _hit_within(tree, rays, 0, 1.0, True) < 1.0
     return out
-
-
-@kernel
-def _is_blocked(tree: Tree, rays: Floats) -> bool:
-    """Return whether ray 0 meets a face before its length is 1."""
-    triangles, nodes, boxes, _ = tree
-    waiting = np.empty(128, dtype=np.int64)
-    waiting[0] = 0
-    left = 1
-    while left > 0:
-        left -= 1
-        n = waiting[left]
-        if not _meets_box(boxes, n, rays, 0, 1.0):
-            continue
-        if nodes[n, LEFT] >= 0:
-            waiting[left], waiting[left + 1] = nodes[n, LEFT], nodes[n, RIGHT]
-            left += 2
-            continue
-        for s in range(nodes[n, BEGIN], nodes[n, END]):
-            if _face_hit(triangles, s, rays, 0) < 1.0:
-                return True
-    return False
 
 
 @kernel

@@ -54,11 +54,10 @@ def face_patches(
     u, v = np.sqrt(rng.random(len(triangles))), rng.random(len(triangles))
     weights = np.column_stack([1.0 - u, u * (1.0 - v), u * v])
     places, normals = np.einsum("nk,nkd->nd", weights, triangles), unit_normals(triangles)
-    buried = -field.distance(places) > _MAX_ERROR_VOXELS * (field.voxel or 0.0)
-    diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
-    before = places[buried] + MeshPolicy().side_share * diagonal * normals[buried]
-    buried[buried] = body.holds(before)
-    places, normals, areas = places[~buried], normals[~buried], triangle_areas(triangles[~buried])
+    deep = np.flatnonzero(-field.distance(places) > _max_error(field))
+    buried = deep[_are_buried(body, places[deep], normals[deep])]
+    areas = triangle_areas(triangles)
+    places, normals, areas = (np.delete(part, buried, axis=0) for part in (places, normals, areas))
     # the first of exponential times is that of each triangle as often as its share of the area
     ranks = rng.exponential(size=len(areas)) / areas
     chosen, _, summed = merged(places, normals, areas, size, ranks=ranks)
@@ -71,7 +70,7 @@ def mesh_patches(
     """Return centres (n, 3), normals (n, 3) and areas (n,) of the patches that triangles make.
 
     Sheets and thin parts are thicker in the field than in the mesh, so their patches move along
-    their normals to the surface. Triangles inside the union of overlapping parts make none.
+    their normals to the surface. Triangles inside the union of overlapping parts make no patch.
 
     Parameters
     ----------
@@ -93,20 +92,30 @@ def mesh_patches(
         places = places - field.distance(places)[:, None] * field.gradient(places)
     moved = np.linalg.norm(places - middles, axis=1)
     good = np.flatnonzero((depths <= max_depth) & (moved <= 2.0 * max_depth))
-    below = depths[good] > _MAX_ERROR_VOXELS * (field.voxel or 0.0)
+    below = depths[good] > _max_error(field)
     areas = triangle_areas(triangles[good])
     first, _, summed = merged(places[good], normals[good], areas, size, below)
     chosen = good[first]
-    buried = np.zeros(len(chosen), dtype=bool)
-    doubtful = np.flatnonzero(below[first])
-    diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
-    before = MeshPolicy().side_share * diagonal * normals[chosen[doubtful]]
-    buried[doubtful] = body.holds(middles[chosen[doubtful]] + before)
-    return places[chosen[~buried]], normals[chosen[~buried]], summed[~buried]
+    deep = np.flatnonzero(below[first])
+    buried = deep[_are_buried(body, middles[chosen[deep]], normals[chosen[deep]])]
+    chosen, summed = np.delete(chosen, buried), np.delete(summed, buried)
+    return places[chosen], normals[chosen], summed
 
 
 _MAX_ERROR_VOXELS = 0.25
 """Tolerance of the distance at the surface of a mesh, voxels."""
+
+
+def _max_error(field: DistanceField) -> float:
+    """Return the tolerance of the distance at the surface of a mesh, metres."""
+    return _MAX_ERROR_VOXELS * (field.voxel or 0.0)
+
+
+def _are_buried(body: MeshBody, places: Floats, normals: Floats) -> Bools:
+    """Return whether (n,) the points just before faces of a mesh, given by places (n, 3) on them
+    and normals (n, 3), are inside the mesh."""
+    diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
+    return np.asarray(body.holds(places + MeshPolicy().side_share * diagonal * normals))
 
 
 def triangle_areas(triangles: Floats) -> Floats:
