@@ -1,6 +1,7 @@
 """What the benchmark scripts share: where the project is, the heading, a table that grows, and the
 rows that are kept for the docs (`benchmarks/tables.py`) when a script is called with `--keep`. With
-`--cpu-limits`, time limits count CPU seconds instead of those of the clock on the wall."""
+`--cpu-limits`, time limits count CPU seconds of the machine of `machine_speed.py` instead of those
+of the clock on the wall, for a machine that also does other work, or is slower."""
 
 from __future__ import annotations
 
@@ -23,9 +24,13 @@ if KEEP:
     sys.argv.remove("--keep")
 
 CPU_LIMITS = "--cpu-limits" in sys.argv
-if CPU_LIMITS:  # limits in CPU seconds, for a machine that also does other work
+SLOWNESS = 1.0
+if CPU_LIMITS:
+    from machine_speed import slowness
+
     sys.argv.remove("--cpu-limits")
-    time.monotonic = time.process_time
+    SLOWNESS = slowness()
+    time.monotonic = lambda: time.process_time() / SLOWNESS
 
 _kept: dict[str, Any] = {}
 
@@ -39,7 +44,12 @@ def source() -> dict[str, str]:
         "date": str(datetime.date.today()),
         "commit": commit or "unknown",
         "machine": f"{os.cpu_count()} cores {platform.machine()}, "
-        f"Python {platform.python_version()}" + (", limits in CPU seconds" if CPU_LIMITS else ""),
+        f"Python {platform.python_version()}"
+        + (
+            f", limits in CPU seconds of a machine {SLOWNESS:.2f} times as fast"
+            if CPU_LIMITS
+            else ""
+        ),
     }
 
 

@@ -61,17 +61,19 @@ def test_over_a_bar_on_a_slant_path():
     assert 0.99 * exact <= found.length <= exact
 
 
-def test_rings_are_left_out():
-    ring = {"torus": {"center": [0, 0, 0], "axis": [1, 0, 0], "major_radius": 3.0,
-                      "minor_radius": 0.5}}  # fmt: skip
-    found = bound_of([ring], (-2.0, 0, 3.0), (2.0, 0, 3.0), 6.0)
-    assert found.length == 4.0
-    assert not found.is_final
-
-
 def test_no_way_around_within_the_box():
     wall = {"box": {"center": [0, 0, 0], "size": [0.4, 50, 50]}}
     assert bound_of([wall], (-3.0, 0, 0), (3.0, 0, 0), 12.0).length == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("turn", np.linspace(0.0, 0.35, 6))
+def test_a_path_across_the_tube_of_a_ring_goes_around_it(turn):
+    """No path slips through where two pieces of the ring meet."""
+    ring = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 3, "minor_radius": 0.5}
+    ends = [(3.0 * math.cos(turn), 3.0 * math.sin(turn), z) for z in (-1.5, 1.5)]
+    found = bound_of([{"torus": ring}], *ends, 5.0, 0.2)
+    exact = around_a_circle(1.5, 0.7)
+    assert 0.97 * exact <= found.length <= exact
 
 
 def test_far_polytopes_are_left_out_first():
@@ -179,6 +181,18 @@ def test_polytopes_lie_inside_of_grown_solids():
         {"box": {"center": [0, 0, 0], "size": [2, 3, 4], "rotation": [10, 20, 30]}},
         {"capsule": {"a": [4, 0, 0], "b": [5, 3, 1], "radius": 0.4}},
         {"cylinder": {"a": [-4, 0, 0], "b": [-5, 3, 1], "radius": 0.7}},
+        {"torus": {"center": [0, 9, 0], "axis": [1, 2, 3], "major_radius": 2, "minor_radius": 0.4}},
+        {"torus": {"center": [0, 9, 0], "axis": [0, 0, 1], "major_radius": 1, "minor_radius": 0.9}},
+        {
+            "torus": {
+                "center": [0, -9, 0],
+                "axis": [0, 2, 0],
+                "start": [1, 0, 1],
+                "major_radius": 3,
+                "minor_radius": 0.2,
+                "angle": 200,
+            }
+        },
         {"post": {"center": [9, 9], "radius": 0.6}},
         {"prism": {"polygon": [[-9, -9], [-7, -9], [-8, -7]]}},
     ]

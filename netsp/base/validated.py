@@ -162,9 +162,8 @@ def parse_json(text: str | bytes, source: str) -> Any:
         is_cut_off = error.msg.startswith("Unterminated") or not error.doc[error.pos :].strip()
         hint = "; the text ends too early: is the file complete?" if is_cut_off else ""
         hint = "; `netsp gtsp` reads this format" if known else hint
-        raise InputError(
-            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}{hint}"
-        ) from None
+        fault = f"{error.msg.removesuffix(' at')} at line {error.lineno}, column {error.colno}"
+        raise InputError(f"{source}: not JSON: {fault}{hint}") from None
     except UnicodeDecodeError:
         raise InputError(f"{source}: not text in UTF-8") from None
     except ValueError:

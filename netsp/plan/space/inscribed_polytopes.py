@@ -25,6 +25,10 @@ FLAT_TOLERANCE = 1e-12
 differs from one by less."""
 
 
+OVERLAP = 0.1
+"""Format of the pieces of a ring: their overlap, as a share of their length."""
+
+
 class Polytopes(NamedTuple):
     """Convex polytopes, their edges, and half-spaces that hold all paths.
 
@@ -102,7 +106,7 @@ def inscribed_polytopes(
 ) -> Polytopes:
     """Return polytopes none of whose inner points is as far from the solids as the room.
 
-    Capsules, cylinders, boxes, posts and convex prisms have polytopes. Half-spaces are walls.
+    Capsules, cylinders, boxes, tori, posts and convex prisms have polytopes. Half-spaces are walls.
     Other solids are left out.
 
     Parameters
@@ -154,6 +158,8 @@ def _shapes(
         yield from _cylinder(row, growth, sides)
     elif kind == solids.BOX:
         yield from _box(row, growth, sides)
+    elif kind == solids.TORUS:
+        yield from _torus(row, growth, sides)
     elif kind == solids.POST:
         if row[2] + growth > 0.0:
             circle = _circle(sides) * (row[2] + growth) + row[:2]
@@ -226,6 +232,38 @@ def _quarter(sides: int) -> Floats:
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     out[0], out[-1] = (1.0, 0.0), (0.0, 1.0)
     return out
+
+
+def _torus(row: Floats, growth: float, sides: int) -> Iterator[Floats]:
+    """Yield the points of pieces of a torus, or of the part of one about an arc.
+
+    Each piece is the hull of two polygons in planes through the axis. Their centres lie outside of
+    the arc as far as the middle of the chord between them lies inside of it, and their radii are
+    less by this distance; so the hull lies within the torus. Neighbours overlap, so that no path
+    slips through between them. There are enough pieces that their chords cost no more than the
+    sides of the polygons.
+    """
+    axis, start, bend, angle = row[3:6], row[6:9], float(row[9]), float(row[11])
+    radius = float(row[10]) + growth
+    if radius <= 0.0:
+        return
+    # the share of the radius that polygons cost is spent on chords, too
+    loss = radius * (1.0 - math.cos(math.pi / sides))
+    longest = 4.0 * math.atan(math.sqrt(loss / bend))
+    count = max(1, math.ceil((1.0 + OVERLAP) * angle / longest))
+    step, is_closed = angle / count, angle >= 2.0 * math.pi * (1.0 - 1e-12)
+    outside = bend * math.tan(0.25 * (1.0 + OVERLAP) * step) ** 2
+    polygon, other = (radius - outside) * _circle(sides), np.cross(axis, start)
+    for k in range(count):
+        extended = 0.5 * OVERLAP * step
+        ends = [k * step - extended, (k + 1) * step + extended]
+        if not is_closed:
+            ends = [max(0.0, ends[0]), min(angle, ends[1])]
+        rings = []
+        for at in ends:
+            away = math.cos(at) * start + math.sin(at) * other
+            rings.append((bend + outside + polygon[:, :1]) * away + polygon[:, 1:] * axis)
+        yield row[:3] + np.vstack(rings)
 
 
 def _box(row: Floats, growth: float, sides: int) -> Iterator[Floats]:

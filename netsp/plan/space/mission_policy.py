@@ -358,7 +358,7 @@ class ClassPolicy:
     max_halvings: int = 6
     max_loops: int = 8
     max_new_loops: int = 2
-    max_states: int = 400
+    max_states: int = 2000
     max_leg_windings: int = 243
     max_tether_windings: int = 2187
     tolerance: float = 2e-3

@@ -23,6 +23,7 @@ import numpy as np
 
 from netsp.base.bounded_work import end_if_abandoned
 from netsp.base.clock import Clock, TimeLimit
+from netsp.base.compiled.compile_policy import long_work
 from netsp.base.errors import InputError, LimitReachedError
 from netsp.base.interrupt_signals import until_interrupt
 from netsp.gtsp.travel.result import relative_gap
@@ -121,7 +122,7 @@ def solve_mission(
             on_progress(text)
 
     options = _SolverOptions(solver, params, iteration_limit, seed)
-    with until_interrupt(time_limit) as clock:
+    with until_interrupt(time_limit) as clock, long_work():
         check_plannable(mission, solver, params, seed)
         run = _MissionRun(mission, clock, report, policy, options)
         try:
