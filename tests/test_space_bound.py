@@ -12,7 +12,7 @@ from netsp.base.clock import Clock
 from netsp.base.errors import InputError
 from netsp.base.time_flags import NEVER
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.mission_policy import PotentialPolicy, StatePolicy
+from netsp.plan.space.mission_policy import EdgePolicy, PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
 from netsp.plan.space.planning_context import PlanningContext
@@ -180,6 +180,21 @@ def test_a_path_that_was_measured_does_not_raise_the_bound(tmp_path):
     while legs.raise_bound(0, 1, Clock()):
         pass
     assert legs.costs[0, 1] <= through((-2, 0, 0), (2, 0.5, 0), 0.0, 0.3, 0.4, 0.1)
+
+
+def test_without_potentials_a_leg_is_exhausted_once_it_is_bounded_around_edges(tmp_path):
+    mission, scene = mission_by_a_slot(0.3, tmp_path)
+    context = PlanningContext.for_mission(mission, scene, scene.field())
+    places = Places.for_mission(mission, context.field)
+    ways = RobotPaths(context, places, StatePolicy().effort(len(places)))
+    effort = PotentialPolicy(2_000, 16_000)
+    edges = EdgePolicy(max_edges=1)  # no polytope has so few
+    legs = LegBounds(ways, [0, 1], effort, edges=edges, uses_potentials=False)
+    while legs.raise_bound(0, 1, Clock()):
+        pass
+    assert legs.is_exhausted(0, 1)
+    legs.uses_potentials = True
+    assert not legs.is_exhausted(0, 1)
 
 
 def test_a_bound_ends_with_its_clock_and_what_is_proven_by_then_is_a_bound():

@@ -101,11 +101,7 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
     except (KeyboardInterrupt, SystemError) as error:
         if not is_interrupt(error):
             raise
-        messages.error(
-            "interrupted; what was compiled is kept, and `netsp warm-up` compiles the rest"
-            if wanted == "warm-up"
-            else "interrupted before there was anything to write"
-        )
+        messages.error(_interrupt_text(wanted))
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _forget_stdout()  # the reader has gone (| head)
@@ -116,6 +112,17 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
         _forget_stdout()
         messages.error(f"output cannot be written: {error.strerror}")
         return EXIT_BAD_INPUT
+
+
+def _interrupt_text(command: str | None) -> str:
+    """Return what to say of a command that was interrupted without a result."""
+    if command == "warm-up":
+        return "interrupted; what was compiled is kept, and `netsp warm-up` compiles the rest"
+    text = "interrupted before there was anything to write"
+    tiered = sys.modules.get("netsp.base.compiled.tiered")
+    if tiered is not None and tiered.TieredDispatcher.has_compiled:
+        text += "; much of the time went into compiling, which `netsp warm-up` does beforehand"
+    return text
 
 
 @contextlib.contextmanager

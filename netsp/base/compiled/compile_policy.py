@@ -67,6 +67,10 @@ class CompilePolicy:
         Wall-clock seconds between two attempts to take the lock of a kernel that another process
         compiles; a small part of a compile time. A shorter interval waits more punctually and takes
         more CPU.
+    counts_shared_code : bool
+        Whether the time that a kernel ran interpreted also counts for other kernels that call the
+        same code, in proportion to the size of that code. Compiling the one compiles a part of the
+        others.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -84,6 +88,7 @@ class CompilePolicy:
     check_interval_s: float = 0.005
     max_idle_checks: int = 20
     lock_interval_s: float = 0.02
+    counts_shared_code: bool = False
     is_eager: bool = False
 
     def __post_init__(self) -> None:
@@ -135,7 +140,12 @@ def long_work(interpreted_share: float = 0.1, numpy_share: float = 0.2) -> Itera
     interpreted_share, numpy_share : float
         Shares of the compile time that kernels run interpreted first (`CompilePolicy`).
     """
-    policy = replace(_policy, interpreted_share=interpreted_share, numpy_share=numpy_share)
+    policy = replace(
+        _policy,
+        interpreted_share=interpreted_share,
+        numpy_share=numpy_share,
+        counts_shared_code=True,
+    )
     with compiled_by(policy):
         yield
 

@@ -26,6 +26,9 @@ _POWER = "_netsp_power"
 
 _in_numpy: dict[Any, Callable[..., Any]] = {}
 
+_time_s: dict[Any, float] = {}
+"""CPU seconds that the code of each kernel ran interpreted, by its function."""
+
 
 def interprets(kernel: Any) -> Callable[[F], F]:
     """Register the vectorised form of a kernel, which runs where the kernel is interpreted.
@@ -83,6 +86,20 @@ def called_kernels(kernel: Any) -> frozenset[Any]:
         if hasattr(other, "py_func") and other.py_func is not kernel.py_func:
             found |= called_kernels(other)
     return frozenset(found)
+
+
+def note_interpreted(kernel: Any, cpu_s: float) -> None:
+    """Note that a kernel ran interpreted for some CPU seconds, which its own code and the kernels
+    that it calls share by their sizes."""
+    sizes = {k.py_func: len(k.py_func.__code__.co_code) for k in called_kernels(kernel)}
+    per_byte = cpu_s / sum(sizes.values())
+    for function, size in sizes.items():
+        _time_s[function] = _time_s.get(function, 0.0) + per_byte * size
+
+
+def interpreted_time(kernel: Any) -> float:
+    """Return the CPU seconds noted for the code of a kernel and of the kernels that it calls."""
+    return sum(_time_s.get(k.py_func, 0.0) for k in called_kernels(kernel))
 
 
 class _Products(ast.NodeTransformer):

@@ -25,7 +25,7 @@ from netsp.base.compiled.arguments import (
     is_in_pool,
 )
 from netsp.base.compiled.compile_policy import CompilePolicy, current_policy
-from netsp.base.compiled.interpretation import called_kernels
+from netsp.base.compiled.interpretation import called_kernels, interpreted_time, note_interpreted
 from netsp.base.compiled.kept_code import may_be_on_disk
 from netsp.base.compiled.overtime import Overtime
 
@@ -115,6 +115,7 @@ class Kernel:
                     spent = thread_time() - begin
                     self._early_s += spent
                     Kernel._total_s += spent
+                    note_interpreted(self, spent)
         return self.dispatcher(*args, **kwargs)
 
     def _budget_s(self, policy: CompilePolicy) -> float:
@@ -122,7 +123,8 @@ class Kernel:
         if may_be_on_disk():
             return 0.0 if is_in_pool() else policy.numba_s - Kernel._total_s
         bytecode = sum(len(k.py_func.__code__.co_code) for k in called_kernels(self))
-        return policy.interpreted_share * policy.compile_time_s(bytecode) - self._early_s
+        spent = interpreted_time(self) if policy.counts_shared_code else self._early_s
+        return policy.interpreted_share * policy.compile_time_s(bytecode) - spent
 
     @property
     def dispatcher(self) -> Any:

@@ -23,7 +23,12 @@ from netsp.base.compiled import disk_cache
 from netsp.base.compiled.arguments import call_within, can_be_interpreted, is_in_pool
 from netsp.base.compiled.compile_lock import is_locked, locked
 from netsp.base.compiled.compile_policy import compiles, current_policy
-from netsp.base.compiled.interpretation import called_kernels, is_in_numpy
+from netsp.base.compiled.interpretation import (
+    called_kernels,
+    interpreted_time,
+    is_in_numpy,
+    note_interpreted,
+)
 from netsp.base.compiled.lazy_library import (
     compiled_for,
     has_machine_code,
@@ -79,7 +84,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         if not on_disk:
             share = policy.numpy_share if is_in_numpy(self) else policy.interpreted_share
             budget_s = share * policy.compile_time_s(self.bytecode())
-        budget_s -= self.interpreted_s
+        budget_s -= interpreted_time(self) if policy.counts_shared_code else self.interpreted_s
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
         if budget_s <= 0.0 and not on_disk and self._is_locked():
             budget_s = policy.compile_time_s(self.bytecode())  # another process is compiling it
@@ -189,7 +194,9 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             except Overtime:
                 pass
             finally:
-                self.interpreted_s += thread_time() - begin
+                spent = thread_time() - begin
+                self.interpreted_s += spent
+                note_interpreted(self, spent)
             return self._compiled(args, {})(*args)
 
         return run

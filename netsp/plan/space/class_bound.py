@@ -292,16 +292,17 @@ class WindingGraph:
         """Return the travel graph of some states, with all legs of tours up to a length."""
         bound, reduced = self.reduced
         order = sorted(states)
+        place = np.array([u for u, _ in order])
+        raised = np.array([states[state] for state in order])
         costs = np.full((len(order), len(order)), np.inf)
         for i, (u, w) in enumerate(order):
-            for j, (v, x) in enumerate(order[:i]):
-                known = self.leg((v, x), (u, w))
-                if known is None:
-                    continue
-                raised = states[u, w] + float(reduced[u, v]) + known.length + states[v, x]
-                if bound + raised <= longest:
-                    costs[i, j] = costs[j, i] = self.costs[u, v] + known.length
-        return TravelGraph.from_costs(costs, [u for u, _ in order])
+            # what a leg may add to the bound, if tours over it are to be short enough
+            spare = longest - bound - raised[i] - raised[:i] - reduced[u, place[:i]]
+            for j in np.flatnonzero(spare >= 0.0).tolist():
+                known = self.leg(order[j], (u, w))
+                if known is not None and known.length <= spare[j]:
+                    costs[i, j] = costs[j, i] = self.costs[u, place[j]] + known.length
+        return TravelGraph.from_costs(costs, place.tolist())
 
 
 TourLeg = tuple[int, int, tuple[tuple[int, int], ...]]

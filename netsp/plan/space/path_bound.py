@@ -88,15 +88,19 @@ def bound_all_tours(
         places,
         clock.part(policy.upright_share),
     )
-    legs = LegBounds(robot_paths, place_numbers, potential, policy)
+    legs = LegBounds(robot_paths, place_numbers, potential, policy, uses_potentials=False)
     classes = classes or defaults.classes
     loops = None
     if _has_one_place_each(legs) and len(place_numbers) > 1:
         loops = WoundLoops.of_mission(robot_paths.context, legs.points, classes)
-    part = clock if loops is None else clock.part(1.0 - classes.share)
-    bounds = [upright or 0.0, _bound_without_tether(legs, part, seed) or 0.0]
-    if loops is not None:
-        bounds.append(_bound_with_windings(legs, loops, clock, seed))
+    bounds = [upright or 0.0]
+    # potentials take seconds for a leg, so they come last
+    for legs.uses_potentials in (False, True):
+        part = clock if loops is None else clock.part(1.0 - classes.share)
+        bounds.append(_bound_without_tether(legs, part, seed) or 0.0)
+        if loops is not None:
+            part = clock if legs.uses_potentials else clock.part(classes.share)
+            bounds.append(_bound_with_windings(legs, loops, part, seed))
     return max(bounds) or None
 
 
@@ -119,6 +123,8 @@ class LegBounds:
         Numbers of the places, as in `paths.places`.
     potential, policy, edges
         Effort for each leg by potentials; time and accuracy; effort for each leg by edges.
+    uses_potentials
+        Whether `raise_bound` uses potentials once it has a bound around edges.
     points
         (v, 3) the start, then the places, metres.
     costs
@@ -132,6 +138,7 @@ class LegBounds:
     potential: PotentialPolicy
     policy: BoundPolicy = field(default_factory=BoundPolicy)
     edges: EdgePolicy = field(default_factory=EdgePolicy)
+    uses_potentials: bool = True
     points: Floats = field(init=False)
     costs: Floats = field(init=False)
     final: Bools = field(init=False)
@@ -151,6 +158,11 @@ class LegBounds:
         self._is_sight_tested = self.final.copy()
         self._clearance = context.field.distance(self.points)
 
+    def is_exhausted(self, u: int, v: int) -> bool:
+        """Return whether `raise_bound` cannot raise the bound of a leg."""
+        done = self.final[u, v] or (self._level[u, v] > 0 and not self.uses_potentials)
+        return bool(done)
+
     def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
         """Raise the bound of a leg, and return whether it has grown.
 
@@ -163,7 +175,7 @@ class LegBounds:
         clock : Clock
             Clock of the run; a grid that would take longer than it allows is skipped.
         """
-        if self.final[u, v]:
+        if self.is_exhausted(u, v):
             return False
         a, b, before = self.points[u], self.points[v], self.costs[u, v]
         context = self.paths.context
@@ -265,7 +277,7 @@ def _bound_without_tether(legs: LegBounds, clock: Clock, seed: int) -> float | N
         if clock.is_up or result.tour is None:
             return best or None
         tour, grown = list(pairwise((*result.tour, 0))), False
-        while not grown and not all(legs.final[u, v] for u, v in tour):
+        while not grown and not all(legs.is_exhausted(u, v) for u, v in tour):
             for u, v in tour:
                 if clock.is_up:
                     return best or None
@@ -285,7 +297,7 @@ def _bound_with_windings(legs: LegBounds, loops: WoundLoops, clock: Clock, seed:
     while not clock.is_up:
         found = bound_by_windings(loops.graph(legs.costs, rooms, clock), clock, seed)
         best, grown = max(best, found.length), False
-        while not grown and not all(legs.final[u, v] for u, v, _ in found.tour):
+        while not grown and not all(legs.is_exhausted(u, v) for u, v, _ in found.tour):
             for u, v, _ in found.tour:
                 if clock.is_up:
                     return best
