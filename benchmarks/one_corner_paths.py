@@ -73,7 +73,7 @@ def compare(kind: str, seed: int, folder: Path) -> Comparison | None:
     scene, field = drawn.scene, drawn.scene.field()
     points = np.array([mission.start, *(w.position for w in mission.waypoints)])
     near = np.minimum(mission.clearance, field.distance(points))
-    rooms = np.maximum(0.0, np.minimum(near[:, None], near[None]) - 0.5 * mission.delta)
+    rooms = np.maximum(0.0, np.minimum(near[:, None], near[None]) - 0.25 * mission.delta)
     low, high = np.array([-4.0, -4.0, -5.0]), np.array([4.0, 4.0, 0.0])
     corners = np.random.default_rng(0).uniform(low, high, (CORNERS, 3))
     corners = np.vstack([drawn.hints, corners])

@@ -180,10 +180,10 @@ def setting_of(kind: str, seed: int, folder: Path, effort: Effort) -> Setting | 
                 names.append((k, c))
         places = np.array(points, dtype=float)
         near = np.minimum(mission.clearance, rooms_at(water, places))
-        rooms = np.minimum(near[:, None], near[None]) - 0.5 * mission.delta
+        rooms = np.minimum(near[:, None], near[None]) - 0.25 * mission.delta
         # few different values: a little more than the judge asks for, and less than the ends have
         step = 0.2 * mission.delta
-        full = mission.clearance - 0.5 * mission.delta
+        full = mission.clearance - 0.25 * mission.delta
         rooms = np.where(rooms < full - 1e-12, np.ceil(rooms / step) * step, full)
         rooms = np.maximum(0.0, np.minimum(rooms, full))
         paths = FreePaths(water, box, places, rooms, drawn.hints, rng, effort.points)

@@ -118,6 +118,19 @@ rods = st.builds(
 )
 
 
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.one_of(boxes, bars, rods), min_size=1, max_size=3), places, places)
+def test_between_two_samples_a_path_is_as_far_from_solids_as_pythagoras_says(solids, middle, to):
+    """On a segment that is 4 cm long, or shorter."""
+    field = Scene(solids=solids).field()
+    half = 0.02 * np.array(to) / max(1.0, float(np.linalg.norm(to)))
+    line = np.array(middle) + np.linspace(-1.0, 1.0, 41)[:, None] * half
+    distances = field.distance(line)
+    sampled = float(distances[[0, -1]].min())
+    if sampled > 0.02:
+        assert distances.min() >= math.sqrt(sampled**2 - 0.02**2) - 1e-9
+
+
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.one_of(boxes, bars, rods), min_size=1, max_size=3), st.floats(0.0, 0.3),
        st.integers(0, 1000))  # fmt: skip

@@ -15,7 +15,7 @@ from netsp.plan.solve_problem import solve_graph
 from netsp.plan.space.mission_policy import EdgePolicy, PotentialPolicy, StatePolicy
 from netsp.plan.space.path_bound import LegBounds, bound_all_tours
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.planning_context import PlanningContext, keeps_clearance
 from netsp.plan.space.potential import (
     Ends,
     Region,
@@ -26,7 +26,7 @@ from netsp.plan.space.potential import (
     steepest,
 )  # fmt: skip
 from netsp.plan.space.space_legs import RobotPaths
-from netsp.plan.space.upright import bound_by_upright_solids
+from netsp.plan.space.upright import bound_by_upright_solids, judged_room
 from netsp.world import Scene
 from netsp.world.mission.mission import Mission
 
@@ -180,6 +180,27 @@ def test_a_path_that_was_measured_does_not_raise_the_bound(tmp_path):
     while legs.raise_bound(0, 1, Clock()):
         pass
     assert legs.costs[0, 1] <= through((-2, 0, 0), (2, 0.5, 0), 0.0, 0.3, 0.4, 0.1)
+
+
+def context_beside(distance: float) -> tuple[PlanningContext, np.ndarray]:
+    """Return a context with a bar, a clearance of 0.3 m and a delta of 0.1 m, and a straight path
+    that passes the bar at a distance."""
+    bar = {"capsule": {"a": [0, 0, -9], "b": [0, 0, 9], "radius": 0.2}}
+    scene = Scene(bounds=BOUNDS, solids=[bar])
+    path = np.array([[-2.0, 0.2 + distance, 0.0], [2.0, 0.2 + distance, 0.0]])
+    mission = Mission(
+        scene="-", anchor=tuple(path[0]), start=tuple(path[0]), tether_length=9.0, clearance=0.3,
+        delta=0.1,
+        waypoints=[{"position": tuple(path[1])}],
+    )  # fmt: skip
+    return PlanningContext.for_mission(mission, scene, scene.field()), path
+
+
+def test_the_judge_lets_corners_dip_by_a_quarter_of_delta_and_the_bound_by_hardly_more():
+    for distance, is_kept in ((0.276, True), (0.274, False)):
+        context, path = context_beside(distance)
+        assert keeps_clearance(context.field, path, context.mission) == is_kept
+    assert 0.274 <= judged_room(0.3, context) <= 0.275
 
 
 def test_without_potentials_a_leg_is_exhausted_once_it_is_bounded_around_edges(tmp_path):

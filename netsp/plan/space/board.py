@@ -19,7 +19,7 @@ from netsp.gtsp.travel.result import Result
 from netsp.model.bound_scope import LowerBound, Scope
 from netsp.model.solution import Status
 from netsp.plan.solve_problem import solve_graph
-from netsp.plan.space.planning_context import PlanningContext
+from netsp.plan.space.planning_context import PlanningContext, max_corner_dip
 from netsp.plan.space.space_legs import DrivenLegs
 from netsp.plan.space.states import States, hang_alike
 from netsp.roadmap.from_state import from_state
@@ -206,7 +206,8 @@ class StateGraph:
         to solids than the clearance, but other paths may not."""
         place = self.states.places.points[self.states.entries[v].place]
         mission = self.context.mission
-        return float(self.context.field.distance(place)) >= mission.clearance - 0.5 * mission.delta
+        min_distance = mission.clearance - max_corner_dip(mission.delta)
+        return float(self.context.field.distance(place)) >= min_distance
 
     @property
     def reached_waypoints(self) -> set[int]:

@@ -288,10 +288,12 @@ class _Judge:
             detail += (
                 f"; a waypoint or the start is {nearest:.3g} m from it"
                 if nearest < mission.clearance
-                else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
+                else f"; pulled taut, corners may be a quarter of delta ({mission.delta:g}) nearer"
             )
         if tight_legs:
-            detail += f", which {self._leg_name(tight_legs[0])} does not keep within half of delta"
+            detail += (
+                f", which {self._leg_name(tight_legs[0])} does not keep within a quarter of delta"
+            )
         return Check(
             "keeps clear of solids",
             free and not tight_legs,

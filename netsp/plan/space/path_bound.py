@@ -50,8 +50,8 @@ def bound_all_tours(
     """Return a lower bound on the length of every tour through some waypoints.
 
     The bound holds for tours that go to the waypoints themselves, keep the mission's clearance as
-    the judge checks it (corners may be half of `delta` nearer), stay within the scene's bounds and
-    within the tether's length of the anchor.
+    the judge checks it (`netsp.plan.space.planning_context.keeps_clearance`), stay within the
+    scene's bounds and within the tether's length of the anchor.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ class LegBounds:
         """
         mission = self.paths.context.mission
         room = min(mission.clearance, float(self._clearance[u]), float(self._clearance[v]))
-        return judged_room(room, mission.delta)
+        return judged_room(room, self.paths.context)
 
     def _region(self, u: int, v: int) -> Region:
         """Return the region of all legs that the judge accepts

@@ -327,7 +327,7 @@ class PlanningContext:
         """Return a path (k, 3) of the robot pulled taut in its class, at its clearance, metres."""
         mission = self.mission
         line = pull_taut(self.field, path, mission.clearance, mission.delta)
-        if mission.clearance >= 0.5 * mission.delta:
+        if mission.clearance >= 0.5 * mission.delta and keeps_clearance(self.field, line, mission):
             return line
         room = min(mission.clearance, end_clearance(self.field, path))
         return lift_corners(self.field, line, room, self.policy.max_lifts)
@@ -421,11 +421,18 @@ def keeps_clearance(field: DistanceField, path: Floats, mission: Mission) -> boo
     """Return whether a path (k, 3) keeps the mission's clearance, or the room at its ends if that
     is less.
 
-    Corners that were pulled taut may be nearer by half of delta.
+    Corners that were pulled taut may be nearer by `max_corner_dip`.
     """
+    room = min(mission.clearance, end_clearance(field, path))
     return min_clearance_along(field, path) >= max(
-        min(mission.clearance, end_clearance(field, path)) - 0.5 * mission.delta, -DEPTH_TOLERANCE
+        room - max_corner_dip(mission.delta), -DEPTH_TOLERANCE
     )
+
+
+def max_corner_dip(delta: float) -> float:
+    """Return the distance by which corners that were pulled taut may be nearer to solids than the
+    clearance, metres; delta is that of the mission."""
+    return 0.25 * delta
 
 
 def end_clearance(field: DistanceField, path: Floats) -> float:

@@ -23,7 +23,12 @@ from netsp.plan.space.clearance_legs import ClearanceLegs
 from netsp.plan.space.cross_sections import Depths, cross_sections, level_range
 from netsp.plan.space.few_obstacles import ReducedProblem, solve_with_few_obstacles
 from netsp.plan.space.places import Places
-from netsp.plan.space.planning_context import CLEARANCE_TOLERANCE, DEPTH_TOLERANCE, PlanningContext
+from netsp.plan.space.planning_context import (
+    CLEARANCE_TOLERANCE,
+    DEPTH_TOLERANCE,
+    PlanningContext,
+    max_corner_dip,
+)
 from netsp.plan.space.potential import BOUND_ROUNDING
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.travel_graph import TravelGraph
@@ -105,14 +110,20 @@ def _bound_in_plane(
     return max(bounds) or None
 
 
-def judged_room(room: float, delta: float) -> float:
+def judged_room(room: float, context: PlanningContext) -> float:
     """Return the least distance from solids of paths that the judge accepts for a robot that keeps
     `room`, metres; negative if the paths may enter solids.
 
     The judge samples paths (`netsp.plan.space.planning_context.keeps_clearance`), so solids may be
-    nearer by half a step between two samples.
+    nearer between two samples. The nearest place of a segment is the foot of the perpendicular from
+    the nearest point of a solid. One of the samples beside it is at most half a step away, and by
+    Pythagoras no farther from that point than the result and half a step allow.
     """
-    return max(room - 0.5 * delta - 2.0 * CLEARANCE_TOLERANCE, -2.0 * DEPTH_TOLERANCE)
+    sampled, half_step = room - max_corner_dip(context.mission.delta), 2.0 * CLEARANCE_TOLERANCE
+    # the distances of voxels are estimates, and those inside of solids are not to a point of them
+    if context.field.voxel is None and sampled > half_step:
+        return math.sqrt(sampled**2 - half_step**2)
+    return max(sampled - half_step, -2.0 * DEPTH_TOLERANCE)
 
 
 def _bound_with_room(
@@ -127,7 +138,7 @@ def _bound_with_room(
     mission, problem = context.mission, roadmap.problem
     points = np.vstack([problem.points, mission.start])
     room = min(mission.clearance, float(context.field.distance(points).min()))
-    growth = max(0.0, dip + judged_room(room, mission.delta))
+    growth = max(0.0, dip + judged_room(room, context))
     try:
         graph = roadmap.to_travel_graph()
         legs = ClearanceLegs(graph, problem.model_copy(update={"clearance": growth}), clock=clock)

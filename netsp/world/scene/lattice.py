@@ -47,11 +47,27 @@ class Dense:
     counts: tuple[int, int, int]
 
     def closest(
-        self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
+        self,
+        sites: Floats,
+        on_progress: OnStage = None,
+        *,
+        with_owners: bool = True,
+        below: Singles | None = None,
     ) -> tuple[Singles, Owners]:
         """Return the distance from each point to the nearest site, and optionally the site's
-        index."""
-        distances, owner = _closest(sites, self.origin, self.size, self.counts, on_progress)
+        index.
+
+        With `below`, which changes by at most the distance of two points between them, distances
+        that are not less than it may be infinite.
+        """
+        where = self.origin, self.size, self.counts
+        if below is None:
+            distances, owner = _closest(sites, *where, on_progress)
+        else:
+            # sweeps lead from point to point, so they need some points around those that count
+            wider = below.reshape(self.counts) + np.float32(2.0 * self.size)
+            distances, owner = _closest(sites, *where, on_progress, wider)
+            distances[owner < 0] = np.inf
         return distances.ravel(), owner.ravel()
 
     def turn_inside(self, values: Singles, triangles: Floats) -> int:
@@ -155,9 +171,15 @@ class Sparse:
         return row[: self.first].reshape(self.counts), row[self.first :].reshape(shape)
 
     def closest(
-        self, sites: Floats, on_progress: OnStage = None, *, with_owners: bool = True
+        self,
+        sites: Floats,
+        on_progress: OnStage = None,
+        *,
+        with_owners: bool = True,
+        below: Singles | None = None,
     ) -> tuple[Singles, Owners]:
-        """Return distances and sites as `Dense` does, slab by slab to save memory."""
+        """Return distances and sites as `Dense` does, slab by slab to save memory, and all of
+        them."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
         owner = np.empty(total if with_owners else 0, dtype=np.int32)
@@ -360,12 +382,17 @@ def report_stage(on_progress: OnStage, stage: str, fraction: float) -> None:
 
 
 def _closest(
-    sites: Floats, origin: Floats, size: float, counts: tuple[int, ...], on_progress: OnStage
+    sites: Floats,
+    origin: Floats,
+    size: float,
+    counts: tuple[int, ...],
+    on_progress: OnStage,
+    below: Singles | None = None,
 ) -> tuple[Singles, Owners]:
-    """Return the distances of all points of a grid to the nearest site, and the index of that
-    site."""
+    """Return the distances of all points of a grid to the nearest site, and the index of that site;
+    where no site is nearer than `below`, that and -1."""
     report_stage(on_progress, "distances", 0.0)
-    distances = np.full(counts, np.float32(np.inf))
+    distances = np.full(counts, np.float32(np.inf)) if below is None else below.copy()
     owner = np.full(counts, -1, dtype=np.int32)
     stop = abandoned()
     nearest_sites(sites, origin, size, distances, owner, stop)

@@ -188,7 +188,8 @@ class _Triangles:
                 sheet = np.concatenate([sheet, self.sites[: len(surface)][thin]])
             if len(sheet):
                 self._check_shell(shell, size, source)
-                near = lattice.closest(sheet, None, with_owners=False)[0]
+                below = values + np.float32(shell)
+                near = lattice.closest(sheet, None, with_owners=False, below=below)[0]
                 values = np.minimum(values, near - np.float32(shell))
                 grow = shell
         if self.has_sheet:
@@ -250,9 +251,9 @@ class _Triangles:
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         off = 1e-3 * lattice.size
         tree: FaceTree | None = None
-        for weights in _TRIED:
-            places = np.einsum("k,mkd->md", weights, surface)
-            lowest = lattice.minimum_nearby(values, places, 1)
+        tried = np.einsum("tk,mkd->tmd", _TRIED, surface)
+        minima = lattice.minimum_nearby(values, tried.reshape(-1, 3), 1).reshape(len(_TRIED), -1)
+        for places, lowest in zip(tried, minima, strict=True):
             thin |= lowest > 0.0
             # behind a flat face of a thick part, some point is half a voxel deep
             shallow = np.flatnonzero(~thin & (lowest > -0.5 * lattice.size))
