@@ -3,11 +3,11 @@
     python benchmarks/cold.py [--runs 3] [--worlds 5] [WORDS …]
 
 Only rows whose names contain one of the words are measured. Each run has its own cache folder
-(`NUMBA_CACHE_DIR`), and the table shows medians. Limits refer to the machine of `machine_speed.py`;
-on a slower one they are longer in proportion. The background process, which compiles what the next
-command may need, is turned off. Bytecode of netsp exists, as after an installation by pip; only the
-demo on a fresh machine starts without it. `claims/first_use.py` measures the same rows for `make
-accept`.
+(`NUMBA_CACHE_DIR`), and the table shows medians. Limits refer to the reference machine
+(`machine_speed.py`); on a slower one they are longer in proportion. The background process, which
+compiles what the next command may need, is turned off. Bytecode of netsp exists, as after an
+installation by pip; only the demo on a fresh machine starts without it. `claims/first_use.py`
+measures the same rows for `make accept`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class FirstUse:
     name : str
         Name of the row.
     max_cpu_s : float
-        CPU seconds that the command may take on the machine of `machine_speed.py`.
+        CPU seconds that the command may take on the reference machine.
     measure : callable
         Returns the CPU seconds of the command, given a folder to work in and an empty cache folder.
     """
@@ -143,8 +143,8 @@ def warm_up_cpu_s(folder: Path, cache: Path) -> float:
 
 
 def limited_cpu_s(folder: Path, cache: Path) -> float:
-    """Return the CPU seconds of a solve with 20,000 classes and a limit of two seconds at the speed
-    of the reference, compiling included."""
+    """Return the CPU seconds, compiling included, of a solve with 20,000 classes and a limit of two
+    seconds on the reference machine."""
     maze, limit_s = ROOT / "problems" / "library" / "maze-30-0.json", 2.0 * slowness()
     return cpu_s(folder, cache, "solve", maze, "-o", "tour.json", "--time-limit", f"{limit_s:.2f}")
 

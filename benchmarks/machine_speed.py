@@ -3,9 +3,9 @@
     python benchmarks/machine_speed.py
 
 A machine that others share may take twice the CPU seconds for the same work an hour later. A
-published limit in seconds therefore refers to a machine that spends `REFERENCE_CPU_S` on a fixed
-piece of work. `make accept` measures this work beside a command, and on a slower machine extends
-the limit in proportion.
+published limit in seconds therefore refers to the *reference machine*, which spends
+`REFERENCE_CPU_S` on a fixed piece of work. `make accept` measures this work before what it limits,
+for first uses also after it, and on a slower machine extends the limit in proportion.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 REFERENCE_CPU_S = 1.0
-"""Unit of the published limits: CPU seconds of `WORK` on the machine that they refer to."""
+"""Unit of the published limits: CPU seconds of `WORK` on the reference machine."""
 
 WORK = """
 import numba, scipy.sparse.csgraph, shapely
@@ -23,7 +23,8 @@ total = 0
 for i in range(5_000_000):
     total += i
 """
-"""What a command does before its functions are compiled: Python imports, and then interprets."""
+"""Program in place of a command whose functions are not compiled: it imports large packages, and
+then interprets a loop."""
 
 
 def slowness() -> float:
@@ -36,4 +37,4 @@ def slowness() -> float:
 
 
 if __name__ == "__main__":
-    print(f"{slowness():.2f} times the CPU seconds of the reference, or fewer")
+    print(f"limits are multiplied by {slowness():.2f} on this machine")

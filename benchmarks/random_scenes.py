@@ -78,7 +78,7 @@ class Draft:
     def gap(self) -> float:
         """Return the width of a gap: just passable by the judge's tolerance, just above the
         clearance on both sides, or wider. Most gaps are narrower than a cell."""
-        narrowest, clear = max(0.0, self.clearance - 0.5 * self.delta) + 0.004, self.clearance
+        narrowest, clear = max(0.0, self.clearance - 0.25 * self.delta) + 0.004, self.clearance
         ranges = ((narrowest, narrowest + 0.02), (clear, clear + 0.03), (clear, clear + 0.3))
         return 2.0 * self.u(*ranges[self.rng.integers(3)])
 

@@ -27,7 +27,7 @@ from netsp.plan.space.wound_loops import WoundLoops
 from netsp.world.mission.mission import Mission
 from netsp.world.scene.scene import Scene
 
-SCENES = ("linked rings", "net pen", "jacket", *(f"frame {n}" for n in range(10)))
+SCENES = ("ring", "linked rings", "net pen", "jacket", *(f"frame {n}" for n in range(10)))
 
 
 def scene_named(name: str) -> tuple[Mission, Scene]:

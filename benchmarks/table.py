@@ -1,7 +1,7 @@
 """What the benchmark scripts share: where the project is, the heading, a table that grows, and the
 rows that are kept for the docs (`benchmarks/tables.py`) when a script is called with `--keep`. With
-`--cpu-limits`, time limits count CPU seconds of the machine of `machine_speed.py` instead of those
-of the clock on the wall, for a machine that also does other work, or is slower."""
+`--cpu-limits`, time limits count CPU seconds of the reference machine (`machine_speed.py`) instead
+of those of the clock on the wall."""
 
 from __future__ import annotations
 
@@ -45,11 +45,7 @@ def source() -> dict[str, str]:
         "commit": commit or "unknown",
         "machine": f"{os.cpu_count()} cores {platform.machine()}, "
         f"Python {platform.python_version()}"
-        + (
-            f", limits in CPU seconds of a machine {SLOWNESS:.2f} times as fast"
-            if CPU_LIMITS
-            else ""
-        ),
+        + (f", limits in CPU seconds × {SLOWNESS:.2f}" if CPU_LIMITS else ""),
     }
 
 

@@ -121,7 +121,7 @@ rods = st.builds(
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.one_of(boxes, bars, rods), min_size=1, max_size=3), places, places)
 def test_between_two_samples_a_path_is_as_far_from_solids_as_pythagoras_says(solids, middle, to):
-    """On a segment that is 4 cm long, or shorter."""
+    """Check segments of up to 4 cm."""
     field = Scene(solids=solids).field()
     half = 0.02 * np.array(to) / max(1.0, float(np.linalg.norm(to)))
     line = np.array(middle) + np.linspace(-1.0, 1.0, 41)[:, None] * half

@@ -207,10 +207,10 @@ def test_without_potentials_a_leg_is_exhausted_once_it_is_bounded_around_edges(t
     mission, scene = mission_by_a_slot(0.3, tmp_path)
     context = PlanningContext.for_mission(mission, scene, scene.field())
     places = Places.for_mission(mission, context.field)
-    ways = RobotPaths(context, places, StatePolicy().effort(len(places)))
+    robot_paths = RobotPaths(context, places, StatePolicy().effort(len(places)))
     effort = PotentialPolicy(2_000, 16_000)
-    edges = EdgePolicy(max_edges=1)  # no polytope has so few
-    legs = LegBounds(ways, [0, 1], effort, edges=edges, uses_potentials=False)
+    edges = EdgePolicy(max_edges=1)  # leaves out all polytopes
+    legs = LegBounds(robot_paths, [0, 1], effort, edges=edges, uses_potentials=False)
     while legs.raise_bound(0, 1, Clock()):
         pass
     assert legs.is_exhausted(0, 1)

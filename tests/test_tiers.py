@@ -785,10 +785,10 @@ def test_time_also_counts_for_kernels_that_call_the_same_code(tmp_path, monkeypa
     kernels = _module(tmp_path, CALLERS)
     monkeypatch.setattr(interpretation, "_time_s", {})
     sizes = [len(k.py_func.__code__.co_code) for k in (kernels.scaled, kernels.caller)]
-    interpretation.note_interpreted(kernels.caller, 2.0)
-    assert interpretation.interpreted_time(kernels.caller) == pytest.approx(2.0)
+    interpretation.add_interpreted_time(kernels.caller, 2.0)
+    assert interpretation.interpreted_time_s(kernels.caller) == pytest.approx(2.0)
     shared = 2.0 * sizes[0] / sum(sizes)
-    assert interpretation.interpreted_time(kernels.scaled) == pytest.approx(shared)
+    assert interpretation.interpreted_time_s(kernels.scaled) == pytest.approx(shared)
     policy = CompilePolicy(compile_s=0.9 * shared, compile_s_per_byte=0.0, counts_shared_code=True)
     with compiled_by(policy):
         assert kernels.scaled(3.0, 2.0, True) == -6.0

@@ -1,6 +1,7 @@
 """Claims about first uses: CPU seconds of all processes when nothing is compiled yet.
 
-On a machine slower than that of the limits, they are extended in proportion (`machine_speed.py`).
+On a machine slower than the reference machine, limits are extended in proportion
+(`machine_speed.py`).
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ def within(use: FirstUse) -> tuple[str, bool]:
 
     before = slowness()
     spent = use.cpu_s()
-    slow = max(before, slowness())
-    return f"{spent:.1f} s CPU on a machine {slow:.2f} times slower", spent <= use.max_cpu_s * slow
+    factor = max(before, slowness())
+    shown = f"{spent:.1f} s CPU (limit × {factor:.2f} on this machine)"
+    return shown, spent <= use.max_cpu_s * factor
 
 
 def claims() -> Iterator[Claim]:

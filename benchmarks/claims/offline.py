@@ -221,7 +221,8 @@ def published_program() -> tuple[str, bool]:
 
 
 def proven_within(goals: int, tether: float, limit: float) -> tuple[str, bool]:
-    """Whether the first world of a cell is proven within a limit."""
+    """Measure whether the first world of a cell is proven within a limit, s of the reference
+    machine."""
     import frontier
     from machine_speed import slowness
 
@@ -231,8 +232,8 @@ def proven_within(goals: int, tether: float, limit: float) -> tuple[str, bool]:
 
 
 def merged() -> tuple[str, bool]:
-    """The tour of the fourth world of 200 goals at tether 300 after a minute; a search alone ends
-    in 4793.18 m at best."""
+    """Measure the tour of the fourth world of 200 goals at tether 300 after a minute of the
+    reference machine; a search alone ends in 4793.18 m at best."""
     import frontier
     from machine_speed import slowness
 
@@ -344,7 +345,8 @@ def certified() -> tuple[str, bool]:
 
 
 def many_classes() -> tuple[str, bool]:
-    """Gap in per cent of a wind farm of 25 turbines after 20 s."""
+    """Measure the gap in per cent of a wind farm of 25 turbines after 20 s of the reference
+    machine."""
     from machine_speed import slowness
 
     from netsp import Problem, solve, verify

@@ -160,7 +160,7 @@ def parse_json(text: str | bytes, source: str) -> Any:
     except json.JSONDecodeError as error:
         known = "NODE_COORD_SECTION" in error.doc or "GTSP_SET_SECTION" in error.doc
         is_cut_off = error.msg.startswith("Unterminated") or not error.doc[error.pos :].strip()
-        hint = "; the text ends too early: is the file complete?" if is_cut_off else ""
+        hint = "; the text ends too early: save or copy the file again" if is_cut_off else ""
         hint = "; `netsp gtsp` reads this format" if known else hint
         fault = f"{error.msg.removesuffix(' at')} at line {error.lineno}, column {error.colno}"
         raise InputError(f"{source}: not JSON: {fault}{hint}") from None

@@ -115,13 +115,13 @@ def _main(argv: Sequence[str] | None, policy: CommandPolicy = CommandPolicy()) -
 
 
 def _interrupt_text(command: str | None) -> str:
-    """Return what to say of a command that was interrupted without a result."""
+    """Return the message for a command that was interrupted before it had a result."""
     if command == "warm-up":
         return "interrupted; what was compiled is kept, and `netsp warm-up` compiles the rest"
     text = "interrupted before there was anything to write"
     tiered = sys.modules.get("netsp.base.compiled.tiered")
     if tiered is not None and tiered.TieredDispatcher.has_compiled:
-        text += "; much of the time went into compiling, which `netsp warm-up` does beforehand"
+        text += "; part of the time went into compiling, which `netsp warm-up` does in advance"
     return text
 
 

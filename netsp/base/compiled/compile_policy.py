@@ -68,9 +68,9 @@ class CompilePolicy:
         compiles; a small part of a compile time. A shorter interval waits more punctually and takes
         more CPU.
     counts_shared_code : bool
-        Whether the time that a kernel ran interpreted also counts for other kernels that call the
-        same code, in proportion to the size of that code. Compiling the one compiles a part of the
-        others.
+        Whether interpreted time counts for every kernel that shares code with the one that ran, in
+        proportion to the size of the shared code. Compiling a kernel also compiles the code that it
+        shares with others.
     is_eager : bool
         Whether all kernels are compiled at their first call.
     """
@@ -133,7 +133,8 @@ def everything_compiled() -> Iterator[None]:
 
 @contextlib.contextmanager
 def long_work(interpreted_share: float = 0.1, numpy_share: float = 0.2) -> Iterator[None]:
-    """Compile kernels early while the body runs, because its work is known to be long.
+    """Compile kernels early while the body runs, because its work is known to be long, and count
+    their time by the code that they share.
 
     Parameters
     ----------

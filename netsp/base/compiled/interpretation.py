@@ -88,17 +88,17 @@ def called_kernels(kernel: Any) -> frozenset[Any]:
     return frozenset(found)
 
 
-def note_interpreted(kernel: Any, cpu_s: float) -> None:
-    """Note that a kernel ran interpreted for some CPU seconds, which its own code and the kernels
-    that it calls share by their sizes."""
+def add_interpreted_time(kernel: Any, cpu_s: float) -> None:
+    """Add the CPU seconds of an interpreted call to the kernel and the kernels that it calls, in
+    proportion to their bytecode."""
     sizes = {k.py_func: len(k.py_func.__code__.co_code) for k in called_kernels(kernel)}
     per_byte = cpu_s / sum(sizes.values())
     for function, size in sizes.items():
         _time_s[function] = _time_s.get(function, 0.0) + per_byte * size
 
 
-def interpreted_time(kernel: Any) -> float:
-    """Return the CPU seconds noted for the code of a kernel and of the kernels that it calls."""
+def interpreted_time_s(kernel: Any) -> float:
+    """Return the CPU seconds added for the code of a kernel and of the kernels that it calls."""
     return sum(_time_s.get(k.py_func, 0.0) for k in called_kernels(kernel))
 
 

@@ -25,7 +25,11 @@ from netsp.base.compiled.arguments import (
     is_in_pool,
 )
 from netsp.base.compiled.compile_policy import CompilePolicy, current_policy
-from netsp.base.compiled.interpretation import called_kernels, interpreted_time, note_interpreted
+from netsp.base.compiled.interpretation import (
+    add_interpreted_time,
+    called_kernels,
+    interpreted_time_s,
+)
 from netsp.base.compiled.kept_code import may_be_on_disk
 from netsp.base.compiled.overtime import Overtime
 
@@ -115,7 +119,7 @@ class Kernel:
                     spent = thread_time() - begin
                     self._early_s += spent
                     Kernel._total_s += spent
-                    note_interpreted(self, spent)
+                    add_interpreted_time(self, spent)
         return self.dispatcher(*args, **kwargs)
 
     def _budget_s(self, policy: CompilePolicy) -> float:
@@ -123,7 +127,7 @@ class Kernel:
         if may_be_on_disk():
             return 0.0 if is_in_pool() else policy.numba_s - Kernel._total_s
         bytecode = sum(len(k.py_func.__code__.co_code) for k in called_kernels(self))
-        spent = interpreted_time(self) if policy.counts_shared_code else self._early_s
+        spent = interpreted_time_s(self) if policy.counts_shared_code else self._early_s
         return policy.interpreted_share * policy.compile_time_s(bytecode) - spent
 
     @property

@@ -24,10 +24,10 @@ from netsp.base.compiled.arguments import call_within, can_be_interpreted, is_in
 from netsp.base.compiled.compile_lock import is_locked, locked
 from netsp.base.compiled.compile_policy import compiles, current_policy
 from netsp.base.compiled.interpretation import (
+    add_interpreted_time,
     called_kernels,
-    interpreted_time,
+    interpreted_time_s,
     is_in_numpy,
-    note_interpreted,
 )
 from netsp.base.compiled.lazy_library import (
     compiled_for,
@@ -84,7 +84,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
         if not on_disk:
             share = policy.numpy_share if is_in_numpy(self) else policy.interpreted_share
             budget_s = share * policy.compile_time_s(self.bytecode())
-        budget_s -= interpreted_time(self) if policy.counts_shared_code else self.interpreted_s
+        budget_s -= interpreted_time_s(self) if policy.counts_shared_code else self.interpreted_s
         can_be = can_be_interpreted(args, policy.max_copied_bytes)
         if budget_s <= 0.0 and not on_disk and self._is_locked():
             budget_s = policy.compile_time_s(self.bytecode())  # another process is compiling it
@@ -196,7 +196,7 @@ class TieredDispatcher(CPUDispatcher):  # type: ignore[misc]
             finally:
                 spent = thread_time() - begin
                 self.interpreted_s += spent
-                note_interpreted(self, spent)
+                add_interpreted_time(self, spent)
             return self._compiled(args, {})(*args)
 
         return run

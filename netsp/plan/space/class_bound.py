@@ -296,7 +296,7 @@ class WindingGraph:
         raised = np.array([states[state] for state in order])
         costs = np.full((len(order), len(order)), np.inf)
         for i, (u, w) in enumerate(order):
-            # what a leg may add to the bound, if tours over it are to be short enough
+            # most that a leg may add to the bound for a tour over it to be short enough
             spare = longest - bound - raised[i] - raised[:i] - reduced[u, place[:i]]
             for j in np.flatnonzero(spare >= 0.0).tolist():
                 known = self.leg(order[j], (u, w))

@@ -35,7 +35,7 @@ class ReducedProblem:
     bound
         Lower bound on its tours, and so on those of the whole problem.
     is_solved
-        Whether its shortest tour is proven shortest.
+        Whether the tour found is proven shortest.
     blocking
         Indices of the obstacles left out that block its shortest tour, the deepest inside it
         first.

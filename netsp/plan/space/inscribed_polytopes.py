@@ -26,7 +26,7 @@ differs from one by less."""
 
 
 OVERLAP = 0.1
-"""Format of the pieces of a ring: their overlap, as a share of their length."""
+"""Format of the pieces of a ring: the overlap of neighbours, as a share of their spacing."""
 
 
 class Polytopes(NamedTuple):
@@ -237,19 +237,18 @@ def _quarter(sides: int) -> Floats:
 def _torus(row: Floats, growth: float, sides: int) -> Iterator[Floats]:
     """Yield the points of pieces of a torus, or of the part of one about an arc.
 
-    Each piece is the hull of two polygons in planes through the axis. Their centres lie outside of
-    the arc as far as the middle of the chord between them lies inside of it, and their radii are
-    less by this distance; so the hull lies within the torus. Neighbours overlap, so that no path
-    slips through between them. There are enough pieces that their chords cost no more than the
-    sides of the polygons.
+    Each piece is the hull of two polygons in planes through the axis. The centres lie outside of
+    the arc by the distance by which the middle of their chord lies inside of it, or by more, and
+    the radii are less by the same distance; so the hull lies within the torus. Neighbours overlap,
+    so that no path slips through between them. There are enough pieces that chords lose no more of
+    the radius than the sides of the polygons do.
     """
     axis, start, bend, angle = row[3:6], row[6:9], float(row[9]), float(row[11])
     radius = float(row[10]) + growth
     if radius <= 0.0:
         return
-    # the share of the radius that polygons cost is spent on chords, too
     loss = radius * (1.0 - math.cos(math.pi / sides))
-    longest = 4.0 * math.atan(math.sqrt(loss / bend))
+    longest = min(math.pi, 4.0 * math.atan(math.sqrt(loss / bend)))
     count = max(1, math.ceil((1.0 + OVERLAP) * angle / longest))
     step, is_closed = angle / count, angle >= 2.0 * math.pi * (1.0 - 1e-12)
     outside = bend * math.tan(0.25 * (1.0 + OVERLAP) * step) ** 2

@@ -21,7 +21,12 @@ from netsp.gtsp.travel.result import relative_gap
 from netsp.judge import Check, Verification
 from netsp.model.bound_scope import OPTIMALITY_TOLERANCE
 from netsp.model.solution import Status
-from netsp.plan.space.planning_context import PlanningContext, keeps_clearance, min_clearance_along
+from netsp.plan.space.planning_context import (
+    PlanningContext,
+    keeps_clearance,
+    max_corner_dip,
+    min_clearance_along,
+)
 from netsp.world.mission.mission import Mission
 from netsp.world.mission.mission_limits import check_bounds, check_size
 from netsp.world.mission.mission_tether import mission_tether
@@ -275,6 +280,7 @@ class _Judge:
     def _check_clearance(self) -> Check:
         """Check that paths keep clear of solids."""
         line, mission = self.tour.line, self.mission
+        dip = max_corner_dip(mission.delta)
         room = min_clearance_along(self.field, line)
         tight_legs = [
             k for k, leg in enumerate(self.legs) if not keeps_clearance(self.field, leg, mission)
@@ -288,12 +294,11 @@ class _Judge:
             detail += (
                 f"; a waypoint or the start is {nearest:.3g} m from it"
                 if nearest < mission.clearance
-                else f"; pulled taut, corners may be a quarter of delta ({mission.delta:g}) nearer"
+                else f"; corners of a taut path may be {dip:.3g} m nearer"
             )
         if tight_legs:
-            detail += (
-                f", which {self._leg_name(tight_legs[0])} does not keep within a quarter of delta"
-            )
+            leg = self._leg_name(tight_legs[0])
+            detail += f"; {leg} is nearer than the {dip:.3g} m allowed at corners of taut paths"
         return Check(
             "keeps clear of solids",
             free and not tight_legs,

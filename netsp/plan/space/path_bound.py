@@ -95,11 +95,12 @@ def bound_all_tours(
         loops = WoundLoops.of_mission(robot_paths.context, legs.points, classes)
     bounds = [upright or 0.0]
     # potentials take seconds for a leg, so they come last
-    for legs.uses_potentials in (False, True):
+    for uses_potentials in (False, True):
+        legs.uses_potentials = uses_potentials
         part = clock if loops is None else clock.part(1.0 - classes.share)
         bounds.append(_bound_without_tether(legs, part, seed) or 0.0)
         if loops is not None:
-            part = clock if legs.uses_potentials else clock.part(classes.share)
+            part = clock if uses_potentials else clock.part(classes.share)
             bounds.append(_bound_with_windings(legs, loops, part, seed))
     return max(bounds) or None
 
@@ -159,14 +160,15 @@ class LegBounds:
         self._clearance = context.field.distance(self.points)
 
     def is_exhausted(self, u: int, v: int) -> bool:
-        """Return whether `raise_bound` cannot raise the bound of a leg."""
+        """Return whether `raise_bound` cannot raise the bound of a leg by the means in use."""
         done = self.final[u, v] or (self._level[u, v] > 0 and not self.uses_potentials)
         return bool(done)
 
     def raise_bound(self, u: int, v: int, clock: Clock) -> bool:
         """Raise the bound of a leg, and return whether it has grown.
 
-        The first time around edges of polytopes, later by potentials on ever finer grids.
+        The first call uses edges of polytopes. With `uses_potentials`, later calls use potentials
+        on ever finer grids.
 
         Parameters
         ----------

@@ -114,13 +114,16 @@ def judged_room(room: float, context: PlanningContext) -> float:
     """Return the least distance from solids of paths that the judge accepts for a robot that keeps
     `room`, metres; negative if the paths may enter solids.
 
-    The judge samples paths (`netsp.plan.space.planning_context.keeps_clearance`), so solids may be
-    nearer between two samples. The nearest place of a segment is the foot of the perpendicular from
-    the nearest point of a solid. One of the samples beside it is at most half a step away, and by
-    Pythagoras no farther from that point than the result and half a step allow.
+    The judge samples paths (`netsp.plan.space.planning_context.keeps_clearance`), and between two
+    samples a path may be nearer to solids. At its nearest point, the line to the solid is
+    perpendicular to the path, and a sample is at most half a step away. So the square of the
+    distance is at least that of the sampled one less that of half a step
+    (docs/theory/space-bounds.md). For voxels, and where the sampled distance is no more than half a
+    step, the result is less by half a step.
     """
-    sampled, half_step = room - max_corner_dip(context.mission.delta), 2.0 * CLEARANCE_TOLERANCE
-    # the distances of voxels are estimates, and those inside of solids are not to a point of them
+    sampled = room - max_corner_dip(context.mission.delta)
+    half_step = 2.0 * CLEARANCE_TOLERANCE  # twice what short paths have, for those of up to 40 km
+    # voxel distances are estimates, and inside a solid the distance is not to a point of it
     if context.field.voxel is None and sampled > half_step:
         return math.sqrt(sampled**2 - half_step**2)
     return max(sampled - half_step, -2.0 * DEPTH_TOLERANCE)

@@ -215,15 +215,15 @@ def first_hits(tree: Tree, rays: Floats) -> Floats:
 
 
 @kernel
-def _hit_within(tree: Tree, rays: Floats, i: int, far: float, any_face: bool) -> float:
-    """Return the length of ray i up to the first face nearer than `far`; `far` without one.
+def _hit_within(tree: Tree, rays: Floats, i: int, max_length: float, stops_at_any: bool) -> float:
+    """Return the length of ray i up to the first face within a maximum length; that without one.
 
-    With `any_face`, the face need not be the first one.
+    With `stops_at_any`, return the length up to any such face.
     """
     triangles, nodes, boxes, _ = tree
     waiting = np.empty(128, dtype=np.int64)
     waiting[0] = 0
-    left, best = 1, far
+    left, best = 1, max_length
     while left > 0:
         left -= 1
         n = waiting[left]
@@ -235,7 +235,7 @@ def _hit_within(tree: Tree, rays: Floats, i: int, far: float, any_face: bool) ->
             continue
         for s in range(nodes[n, BEGIN], nodes[n, END]):
             best = min(best, _face_hit(triangles, s, rays, i))
-        if any_face and best < far:
+        if stops_at_any and best < max_length:
             break
     return float(best)
 

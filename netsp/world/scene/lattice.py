@@ -57,14 +57,14 @@ class Dense:
         """Return the distance from each point to the nearest site, and optionally the site's
         index.
 
-        With `below`, which changes by at most the distance of two points between them, distances
-        that are not less than it may be infinite.
+        `below` (n,) has a limit for each point; a distance that is not less may be infinite.
+        The limits of two points may not differ by more than the distance of the points.
         """
         where = self.origin, self.size, self.counts
         if below is None:
             distances, owner = _closest(sites, *where, on_progress)
         else:
-            # sweeps lead from point to point, so they need some points around those that count
+            # sweeps pass sites from point to point, also by points a little beyond the limit
             wider = below.reshape(self.counts) + np.float32(2.0 * self.size)
             distances, owner = _closest(sites, *where, on_progress, wider)
             distances[owner < 0] = np.inf
@@ -178,8 +178,8 @@ class Sparse:
         with_owners: bool = True,
         below: Singles | None = None,
     ) -> tuple[Singles, Owners]:
-        """Return distances and sites as `Dense` does, slab by slab to save memory, and all of
-        them."""
+        """Return distances and sites as `Dense` does, slab by slab to save memory; `below` is
+        ignored."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
         owner = np.empty(total if with_owners else 0, dtype=np.int32)
@@ -389,8 +389,8 @@ def _closest(
     on_progress: OnStage,
     below: Singles | None = None,
 ) -> tuple[Singles, Owners]:
-    """Return the distances of all points of a grid to the nearest site, and the index of that site;
-    where no site is nearer than `below`, that and -1."""
+    """Return the distances of all points of a grid to the nearest site, and the index of that site.
+    Where no site is nearer than `below`, return `below` and index -1."""
     report_stage(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf)) if below is None else below.copy()
     owner = np.full(counts, -1, dtype=np.int32)

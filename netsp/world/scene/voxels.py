@@ -188,7 +188,7 @@ class _Triangles:
                 sheet = np.concatenate([sheet, self.sites[: len(surface)][thin]])
             if len(sheet):
                 self._check_shell(shell, size, source)
-                below = values + np.float32(shell)
+                below = np.abs(values) + np.float32(shell)
                 near = lattice.closest(sheet, None, with_owners=False, below=below)[0]
                 values = np.minimum(values, near - np.float32(shell))
                 grow = shell

@@ -112,8 +112,8 @@ def _max_error(field: DistanceField) -> float:
 
 
 def _are_buried(body: MeshBody, places: Floats, normals: Floats) -> Bools:
-    """Return whether (n,) the points just before faces of a mesh, given by places (n, 3) on them
-    and normals (n, 3), are inside the mesh."""
+    """Return the mask (n,) of faces of a mesh whose points just before them are inside the mesh;
+    places (n, 3) and normals (n, 3) are those of the faces."""
     diagonal = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
     return np.asarray(body.holds(places + MeshPolicy().side_share * diagonal * normals))
 
