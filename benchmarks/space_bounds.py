@@ -73,8 +73,8 @@ def main() -> None:
     for name in args.scenes:
         tour = published_tour(name)
         without, best, counted, took = bounds_of(name, args.seconds)
-        row(name, counted, f"{tour:.1f}", f"{without:.2f}", f"{100 * (tour / without - 1):.1f}",
-            f"{best:.2f}", f"{100 * (tour / best - 1):.1f}", f"{took:.0f}")  # fmt: skip
+        row(name, counted, f"{tour:.1f}", f"{without:.2f}", f"{100 * (1 - without / tour):.1f}",
+            f"{best:.2f}", f"{100 * (1 - best / tour):.1f}", f"{took:.0f}")  # fmt: skip
 
 
 if __name__ == "__main__":
